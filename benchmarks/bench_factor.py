@@ -22,7 +22,7 @@ from scipy.sparse.linalg import splu
 
 import eigenshape as es
 from certeig.sparse.elimination import analyze_pattern
-from certeig.sparse.symmetric_factor import factorize_symmetric
+from certeig.sparse.symmetric_factor import SymmetricFactor
 
 PACKAGES = [
     "eigenshape",
@@ -73,7 +73,7 @@ def ours(a: sp.csc_array, right: np.ndarray) -> tuple[Timed, np.ndarray, dict[st
     """Nested dissection, multifrontal L D Lᵀ."""
     a.sort_indices()
     analysis, elimination = clock(lambda: analyze_pattern(a))
-    factoring, factor = clock(lambda: factorize_symmetric(elimination, a.data))
+    factoring, factor = clock(lambda: SymmetricFactor.of_entries(elimination, a.data))
     solution = np.empty_like(right)
     scratch = factor.scratch()
     solving, _ = clock(lambda: factor.solve_lanes(right, solution, scratch))

@@ -20,9 +20,9 @@ from report import Report, Row, one_core, options_of
 from threadpoolctl import threadpool_limits
 
 import eigenshape as es
-from certeig.solver import eigenpairs, factor, lanczos, pencil
-from certeig.solver import inertia as count
+from certeig.solver import eigenpairs, lanczos, pencil
 from certeig.solver import strategy as roads
+from certeig.solver.factor import Factor
 from certeig.sparse.symmetric_factor import SymmetricFactor
 
 COLUMNS = ("shape", "part", "calls", "CPU s", "share", "bound s", "set by", "times the bound")
@@ -94,15 +94,14 @@ def _rounding(of: Any) -> Work:
 
 PARTS: tuple[tuple[str, object, str, Callable[..., Work]], ...] = (
     ("order and analysis", pencil, "analyze_pattern", _analysis),
-    ("factors", pencil, "factorize_symmetric", _factor),
-    ("factors", factor, "factorize_symmetric", _factor),
+    ("factors", SymmetricFactor, "of_entries", _factor),
     ("solves", SymmetricFactor, "solve_lanes", _solve),
     ("orthogonalization", lanczos, "_orthonormalize", _orthogonal),
     ("Ritz values", lanczos, "_ritz_space", _eigh),
     ("Ritz vectors", lanczos.RitzSpace, "vectors", _combine),
     ("residuals", eigenpairs, "rayleigh_residuals", _residuals),
     ("proof", roads, "prove", _proof),
-    ("proof", count, "rounding", _rounding),
+    ("proof", Factor, "rounding", _rounding),
 )
 
 

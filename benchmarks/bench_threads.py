@@ -21,7 +21,7 @@ from report import Report, Row, options_of
 import eigenshape as es
 from certeig.kit.threads import map_in_threads, one_blas_thread, usable_cores
 from certeig.sparse.elimination import analyze_pattern
-from certeig.sparse.symmetric_factor import SymmetricFactor, factorize_symmetric
+from certeig.sparse.symmetric_factor import SymmetricFactor
 
 COLUMNS = ("case", "one thread s", "two threads s", "one / two", "all cores s", "one / all")
 Work = Callable[[], Sequence[np.ndarray]]  # what is timed; the arrays are compared
@@ -44,7 +44,7 @@ def factored(quick: bool) -> tuple[Callable[[], SymmetricFactor], int]:
     matrix = (laplacian.stiffness + laplacian.mass).tocsc()
     matrix.sort_indices()
     elimination = analyze_pattern(matrix)
-    return lambda: factorize_symmetric(elimination, matrix.data), matrix.shape[0]
+    return lambda: SymmetricFactor.of_entries(elimination, matrix.data), matrix.shape[0]
 
 
 def factor(quick: bool) -> Work:

@@ -6,7 +6,7 @@ import numpy as np
 import scipy.linalg as sl
 import scipy.sparse as sp
 
-from certeig.solver.pencil import Pencil, normalize
+from certeig.solver.pencil import Pencil
 
 
 def adjacency(n: int, *, closed: bool = False) -> sp.csr_array:
@@ -157,7 +157,7 @@ def full_parts(copies: int) -> sp.csr_array:
 
 def scaled(stiffness: sp.sparray, mass: sp.sparray | None = None) -> Pencil:
     """Return a pencil as the solver has it."""
-    return normalize(
+    return Pencil.scaled(
         sp.csr_array(stiffness),
         sp.csr_array(sp.eye_array(stiffness.shape[0])) if mass is None else mass,
     )

@@ -13,7 +13,7 @@ from scipy.spatial.distance import cdist
 from scipy.spatial.transform import Rotation
 
 import eigenshape as es
-from eigenshape.scans.raster import rasterize
+from eigenshape.scans.raster import Raster
 
 N_FIELDS = 10  # dodecahedra, as in the paper
 N_VIEWS = 10  # silhouettes of each: 20 vertices, of which opposite ones see mirror images
@@ -42,7 +42,7 @@ def light_field(mesh: es.TriangleMesh, n_fields: int = N_FIELDS, size: int = 256
     for field, turn in enumerate(_turns(n_fields)):
         for view, axis in enumerate(_axes() @ turn.T):
             flat = (points @ _turn_towards(axis).T[:, :2]) * (size / 2 - MARGIN) + size / 2
-            covered = rasterize(np.pad(flat, ((0, 0), (0, 1))), mesh.faces, size, size).face >= 0
+            covered = Raster.of(np.pad(flat, ((0, 0), (0, 1))), mesh.faces, size, size).face >= 0
             found[field, view] = _describe_silhouette(covered)
     return found
 

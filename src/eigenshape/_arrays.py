@@ -1,4 +1,4 @@
-"""Arrays that belong to a shape: checks of coordinates, indices and values; equal rows, and linked ones."""
+"""Arrays that belong to a shape: checks of coordinates, indices, sources and values; equal rows, and linked ones."""
 
 from typing import Any
 
@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float, Int
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from certeig.kit.arrays import all_finite, as_array, real_numbers, whole_number
+from certeig.kit.arrays import all_finite, as_array, real_numbers, whole_number, whole_numbers
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike, Integer
 from eigenshape._errors import InvalidShapeError
@@ -19,6 +19,7 @@ INDEXED = {"faces": "vertices", "simplices": "points"}
 
 # Steps of a loop at most. One takes 0.1 ms or more, so that a number mistyped would run for days.
 MOST_STEPS = 1_000_000
+NO_SOURCE = "There must be at least one source; there is none."
 MOST_COORDINATES = 3  # of a row that messages show as a vector: those of a point in space
 
 
@@ -189,3 +190,60 @@ def adjacency_matrix(edges: Int[np.ndarray, "e 2"], values: np.ndarray, n: int) 
     """Return the symmetric matrix of weighted edges, each given once."""
     both = np.concatenate([edges, edges[:, ::-1]]).T
     return sp.coo_array((np.tile(values, 2), both), shape=(n, n)).tocsr()
+
+
+def as_affine(to_space: ArrayLike | None) -> np.ndarray:
+    """Return an affine map of space as a matrix, by default that which changes nothing.
+
+    Raise InvalidParameterError if it is no such matrix or cannot be inverted.
+    """
+    if to_space is None:
+        return np.eye(4)
+    matrix = real_numbers(to_space, "to_space").astype(np.float64)
+    if (
+        matrix.shape != (4, 4)
+        or not np.isfinite(matrix).all()
+        or not np.array_equal(matrix[3], [0, 0, 0, 1])
+        or np.linalg.matrix_rank(matrix[:3, :3]) < 3
+    ):
+        given = matrix.tolist() if matrix.size <= 16 else "larger"
+        raise InvalidParameterError(
+            "to_space must be an affine map that can be inverted, finite numbers of shape (4, 4) whose "
+            f"last row is 0, 0, 0, 1; it is {given}, of shape {matrix.shape}."
+        )
+    return matrix
+
+
+def different_values(table: np.ndarray, most: int, noun: str) -> str:
+    """List the different values of a table, the first of them if they are too many."""
+    there = np.unique(table)
+    ending = f", ... ({len(there)} {noun})" if len(there) > most else ""
+    return ", ".join(f"{value:g}" for value in there[:most].astype(float)) + ending
+
+
+def source_sets(sources: ArrayLike, n_points: int) -> list[Int[np.ndarray, " s"]]:
+    """Return the points of each source, ascending: a source is a point, or a set of points.
+
+    Raises an error if one is not a point.
+    """
+    try:
+        entries: list[Any] = list(sources)  # type: ignore[arg-type]
+    except (TypeError, KeyError):  # one number, or an object that is read by names
+        entries = [sources]
+    return [source_points(entry, n_points) for entry in entries]
+
+
+def source_points(source: ArrayLike, n_points: int) -> Int[np.ndarray, " s"]:
+    """Return the points of one source, ascending and each once. Raises an error if one is not a point."""
+    return np.unique(whole_numbers(source, "A source", 0, n_points - 1))
+
+
+def require_sources(sources: ArrayLike, n_points: int) -> Int[np.ndarray, " k"]:
+    """Return sources as integers.
+
+    Raise InvalidParameterError if there is none, or one is not a point.
+    """
+    wanted = whole_numbers(sources, "A source", 0, n_points - 1)
+    if not wanted.size:
+        raise InvalidParameterError(NO_SOURCE)
+    return wanted

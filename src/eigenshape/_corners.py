@@ -196,3 +196,33 @@ def mean_normals(mesh: HasSimplices) -> Float[np.ndarray, "n 3"]:
     vectors = area_vectors(scaled_corners(mesh)[0])
     sums = [at_points(mesh, vectors[:, axis]) for axis in range(3)]
     return unit_vectors(np.column_stack(sums))
+
+
+def longest_edges(mesh: HasSimplices) -> Float[np.ndarray, " s"]:
+    """Return the length of the longest edge of each simplex."""
+    corners, scale = scaled_corners(mesh)
+    return in_length(side_lengths(corners).max(axis=1), scale, 1)
+
+
+def face_angles(mesh: HasSimplices) -> Float[np.ndarray, "f 3"]:
+    """Return the angle at each corner of each triangle, in radians."""
+    corners, _ = scaled_corners(mesh)
+    one, two = (np.roll(corners, -turn, axis=1) - corners for turn in (1, 2))
+    sines = np.linalg.norm(np.cross(one, two), axis=2)
+    return np.arctan2(sines, np.einsum("fij,fij->fi", one, two))
+
+
+def unique_edges(
+    one: Int[np.ndarray, "..."], two: Int[np.ndarray, "..."], n: int
+) -> Int[np.ndarray, "e 2"]:
+    """Return pairs of n points without duplicates, the lower first, in lexicographic order."""
+    # np.unique hashes integers, which takes several times as long as sorting them.
+    keys = np.sort((np.minimum(one, two) * n + np.maximum(one, two)).ravel())
+    return np.column_stack(np.divmod(keys[np.diff(keys, prepend=-1) > 0], n))
+
+
+def edges_of(mesh: HasSimplices) -> Int[np.ndarray, "e 2"]:
+    """Return the edges of a mesh of any dimension, the lower point first, in lexicographic order."""
+    corners = mesh.simplices
+    first, second = np.triu_indices(corners.shape[1], 1)
+    return unique_edges(corners[:, first], corners[:, second], len(mesh.points))

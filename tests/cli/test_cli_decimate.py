@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from running import run, run_json
 
-from eigenshape.io.labeled_shapes import read_labels
+from eigenshape.io.label_files import read_labels
 from eigenshape.io.mesh_files import read_mesh, write_mesh
 from eigenshape.shapes.surfaces import icosphere
 

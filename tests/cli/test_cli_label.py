@@ -9,7 +9,8 @@ from running import run
 
 from eigenshape.features.parts import find_parts
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.labeled_shapes import read_labeled_shape, read_labels, write_labels
+from eigenshape.io.label_files import read_labels, write_labels
+from eigenshape.io.labeled_shapes import read_labeled_shape
 from eigenshape.io.mesh_files import read_mesh, write_mesh
 from eigenshape.retrieval.labels.transfer import transfer_labels
 from eigenshape.shapes.creatures import make_creature

@@ -22,7 +22,7 @@ from eigenshape.deformation.handles import Translation
 from eigenshape.geometry.repairs.repair import REPAIRS
 from eigenshape.geometry.topology import is_closed
 from eigenshape.io.folders import find_items
-from eigenshape.io.labeled_shapes import read_labels
+from eigenshape.io.label_files import read_labels
 from eigenshape.io.shape_files import write_points
 from eigenshape.shapes.creatures import make_creature
 from eigenshape.shapes.spheres import icosphere

@@ -16,11 +16,11 @@ import eigenshape
 from eigenshape.cli import app
 from eigenshape.cli.inputs import HeatMethod
 from eigenshape.cli.spectrum import USUAL
+from eigenshape.cli.steps.recipes import PRESETS
 from eigenshape.cli.verbs import INDEX_VERBS, TOGETHER, VERBS, load_verb
 from eigenshape.features.contrast import PART_CONTRAST
 from eigenshape.geometry.repairs.repair_names import MESH_REPAIRS
 from eigenshape.io.formats.registry import WRITTEN
-from eigenshape.retrieval.heat.recipe import PRESETS
 from eigenshape.stability.plan import USUAL_K
 
 COMMAND = typer.main.get_command(app)

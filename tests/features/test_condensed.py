@@ -71,3 +71,15 @@ def test_bad_values_are_refused():
     loose = es.TriangleMesh([*BALL.vertices, [9, 9, 9]], BALL.faces)
     with pytest.raises(InvalidShapeError, match="642"):
         condense(loose, np.zeros(643))
+
+
+def test_a_table_has_a_row_for_each_region_and_a_name_for_each_column():
+    found = condense(BALL, BALL.vertices[:, :2])
+    table = found.table(["one", "two"])
+    assert list(table) == ["region", "x", "y", "z", "area", "n_vertices", "one", "two"]
+    np.testing.assert_array_equal(np.column_stack([table["one"], table["two"]]), found.values)
+    assert table["n_vertices"].sum() == BALL.n_vertices
+    with pytest.raises(
+        InvalidParameterError, match=r"must hold one for each of 2 columns .*; it holds 1"
+    ):
+        found.table(["one"])

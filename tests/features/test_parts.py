@@ -11,13 +11,13 @@ from eigenshape.features.contrast import FINE_CONTRAST, contrast_at
 from eigenshape.features.merge_tree import merge_tree
 from eigenshape.features.part_contrast import SIGHT_REACH, lines_of_sight
 from eigenshape.features.part_merging import SEED_TIME, part_tree
-from eigenshape.features.parts import find_parts, part_spectrum
+from eigenshape.features.parts import find_parts
 from eigenshape.features.segmentation import FeaturePoints, Segmentation, adjacent_parts, segment
 from eigenshape.geometry.facets import facet_components, facet_table
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.resolution.subdivision import subdivide
-from eigenshape.geometry.topology import disjoint_union, edge_table, face_pairs, submesh
+from eigenshape.geometry.topology import disjoint_union, edge_table, submesh
 from eigenshape.operators.anisotropic import curvature_tensors
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.creatures import make_creature
@@ -59,7 +59,7 @@ def test_a_ball_is_one_part():
 
 def test_persistence_is_what_is_left_of_a_difference_between_two_parts():
     mesh = dumbbell()
-    spectrum = part_spectrum(mesh)
+    spectrum = find_parts(mesh).spectrum
     tree = part_tree(mesh, spectrum, time=0.2)
     labels = segment(tree, n_regions=2).labels
     areas = face_areas(mesh)
@@ -96,7 +96,7 @@ def brute_force_merging(mesh, spectrum, time):
 @pytest.mark.long
 def test_part_tree_merges_the_cheapest_pair_each_time():
     mesh = make_creature("fish", n_vertices=600)
-    spectrum = part_spectrum(mesh)
+    spectrum = find_parts(mesh).spectrum
     tree = part_tree(mesh, spectrum)
     expected = brute_force_merging(mesh, spectrum, 0.1)
     np.testing.assert_allclose(tree.persistence[1:], expected[::-1], rtol=1e-9)
@@ -107,7 +107,7 @@ def test_parts_of_several_components_stand_by_their_height(first):
     ball = icosphere(2)
     both = TriangleMesh(3 + 2 * ball.vertices, ball.faces), ball
     mesh = disjoint_union(both[first], both[1 - first])
-    tree = part_tree(mesh, part_spectrum(mesh, n_modes=40))
+    tree = part_tree(mesh, find_parts(mesh, n_modes=40).spectrum)
     assert (tree.parent[:2] == -1).all()
     assert tree.values[0] > tree.values[1]
     assert sorted(tree.maxima[:2] < ball.n_vertices) == [False, True]
@@ -224,7 +224,7 @@ def test_each_component_is_a_part_at_least():
 
 def cut_length(mesh, labels):
     table = edge_table(mesh)
-    pairs, edges = face_pairs(table)
+    pairs, edges = table.face_pairs
     ends = mesh.vertices[table.edges[edges[labels[pairs[:, 0]] != labels[pairs[:, 1]]]]]
     return np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).sum()
 

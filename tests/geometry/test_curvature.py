@@ -2,8 +2,9 @@ import numpy as np
 import pytest
 
 import eigenshape as es
+from eigenshape._corners import face_angles
 from eigenshape._errors import InvalidShapeError
-from eigenshape.geometry.curvature import angle_defects, face_angles
+from eigenshape.geometry.curvature import angle_defects
 from eigenshape.geometry.topology import submesh
 
 

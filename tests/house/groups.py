@@ -96,18 +96,21 @@ def public_names() -> dict[str, dict[str, str]]:
     return found
 
 
-# What every group may use: checks of arguments, arrays, matrices and meshes, vectors, corners,
-# errors, threads, kernels, files, workers, extras
+# What every group may use: checks of arguments, arrays, matrices, meshes, operators and spectra,
+# vectors, corners, errors and their remedies, threads, kernels, files, workers, extras
 TOOLKIT = (
     "certeig.kit.",
     "eigenshape.geometry.conversion.",
     "eigenshape.geometry.requirements.",
+    "eigenshape.operators.requirements.",
+    "eigenshape.spectral.requirements.",
     *(
         f"eigenshape._{name}"
         for name in (
             "arrays",
             "corners",
             "errors",
+            "makers",
             "extras",
             "sealed",
             "typing",

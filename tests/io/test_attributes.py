@@ -14,7 +14,7 @@ from PIL import Image
 
 import eigenshape as es
 from eigenshape import FileFormatError, InvalidParameterError
-from eigenshape.io.attributes import linear_colors, plain_attributes, screen_colors
+from eigenshape.io.attributes import MeshAttributes, linear_colors, screen_colors
 from eigenshape.io.formats.gltf import pack, read_gltf
 from eigenshape.io.formats.obj import read_sheet
 from eigenshape.io.mesh_files import save_mesh
@@ -590,7 +590,9 @@ def test_faces_of_a_filled_hole_look_as_their_neighbors(tmp_path):
 def test_both_sides_of_a_sheet_keep_their_own_looks():
     faces = np.array([[0, 1, 2], [2, 1, 0]])
     mesh = es.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], faces)
-    sides = replace(plain_attributes(mesh), face_groups=np.array([0, 1]), groups=("front", "back"))
+    sides = replace(
+        MeshAttributes.plain(mesh), face_groups=np.array([0, 1]), groups=("front", "back")
+    )
     swapped = es.TriangleMesh(mesh.vertices, faces[::-1])
     assert es.io.carry_attributes(sides, swapped).face_groups.tolist() == [1, 0]
 

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 import eigenshape as es
 from eigenshape import FileFormatError
 from eigenshape.cli import app
-from eigenshape.io.attributes import Material, plain_attributes
+from eigenshape.io.attributes import Material, MeshAttributes
 from eigenshape.io.carrying import carry_attributes
 from eigenshape.io.mesh_files import save_mesh
 
@@ -36,7 +36,7 @@ def longitudes(mesh):
 
 def textured_ball():
     return replace(
-        plain_attributes(BALL), texture_coordinates=longitudes(BALL), normals=BALL.vertices[BALL.faces],
+        MeshAttributes.plain(BALL), texture_coordinates=longitudes(BALL), normals=BALL.vertices[BALL.faces],
         materials=(OAK,), face_materials=np.zeros(BALL.n_faces, dtype=int),
     )  # fmt: skip
 

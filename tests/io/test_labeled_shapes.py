@@ -2,12 +2,8 @@ import numpy as np
 import pytest
 
 from certeig.kit.errors import FileFormatError, InvalidParameterError
-from eigenshape.io.labeled_shapes import (
-    read_label_names,
-    read_labeled_shape,
-    read_labeled_shapes,
-    write_labels,
-)
+from eigenshape.io.label_files import write_labels
+from eigenshape.io.labeled_shapes import read_label_names, read_labeled_shape, read_labeled_shapes
 from eigenshape.io.mesh_files import write_mesh
 from eigenshape.shapes.surfaces import icosphere
 

@@ -4,7 +4,7 @@ import trimesh
 from tetrahedra import TETRAHEDRON
 
 from certeig.kit.errors import FileFormatError, InvalidParameterError
-from eigenshape.io.labeled_shapes import read_labels, write_labels
+from eigenshape.io.label_files import read_labels, write_labels
 from eigenshape.io.mesh_files import read_mesh, write_mesh
 
 

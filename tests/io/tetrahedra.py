@@ -5,14 +5,14 @@ from pathlib import Path
 import numpy as np
 
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.attributes import plain_attributes
+from eigenshape.io.attributes import MeshAttributes
 from eigenshape.io.formats import gltf, gltf_attributes, obj, obj_attributes, off, ply, stl, vtp
 from eigenshape.io.formats.cells import select_cells
 
 VERTICES = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
 FACES = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]
 TETRAHEDRON = TriangleMesh(VERTICES, FACES)
-PLAIN = plain_attributes(TETRAHEDRON)
+PLAIN = MeshAttributes.plain(TETRAHEDRON)
 
 BIG_ENDIAN = ply.format_binary(TETRAHEDRON).replace(b"little", b"big")
 BIG_ENDIAN = BIG_ENDIAN[: BIG_ENDIAN.index(b"end_header\n") + 11]

@@ -27,6 +27,7 @@ LEFT_OUT = {
     "Registration.after": "takes another of its kind",
     "CarriedLandmarks.save": "bends a collection, which takes seconds; tests/collections",
     "Collection.number": "takes a name",
+    "Collection.read_placed": "takes a name",
     "Collection.read_specimen": "takes a name",
     "DeformationSession.commit": "needs a drag",
     "DeformationSession.preview": "needs a drag",

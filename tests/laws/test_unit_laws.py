@@ -278,7 +278,6 @@ LAWS: dict[str, tuple[int, Callable[[Shapes], Any]]] = {
         ),
     ),
     "orient_outward": (1, lambda s: geometry.orient_outward(s.mesh)),
-    "part_spectrum": (-2, lambda s: es.features.part_spectrum(s.mesh).eigenvalues[1:]),
     "random_planes": (
         1,
         lambda s: es.scans.random_planes(s.mesh, np.random.default_rng(0))[:, 3],

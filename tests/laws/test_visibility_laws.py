@@ -12,7 +12,7 @@ from scipy.ndimage import binary_fill_holes
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import disjoint_union, unreferenced_vertices
 from eigenshape.scans.partial import cut_by_planes, partial_scan, random_planes, rotation_towards
-from eigenshape.scans.raster import rasterize
+from eigenshape.scans.raster import Raster
 from eigenshape.shapes.surfaces import grid, icosphere, torus
 
 SPHERE = icosphere(3)
@@ -38,7 +38,7 @@ def test_slivers_leave_no_pinhole(stretch):
     for seed in range(4):
         rotation = np.linalg.qr(np.random.default_rng(seed).standard_normal((3, 3)))[0]
         points, faces = sphere_in_pixels(151, stretch=stretch, rotation=rotation)
-        assert holes(rasterize(points, faces, 151, 151).face >= 0) == 0
+        assert holes(Raster.of(points, faces, 151, 151).face >= 0) == 0
 
 
 @settings(deadline=None, max_examples=20)
@@ -57,7 +57,7 @@ def test_edges_through_pixel_middles_leave_no_gap(seed):
     faces = np.concatenate([np.column_stack([a, b, d]), np.column_stack([a, d, c])])
     wanted = np.zeros((44, 44), dtype=bool)
     wanted[2:41, 2:41] = True
-    assert np.array_equal(rasterize(points, faces, 44, 44).face >= 0, wanted)
+    assert np.array_equal(Raster.of(points, faces, 44, 44).face >= 0, wanted)
 
 
 def nearest_by_hand(points, faces, column, row):
@@ -83,7 +83,7 @@ def test_equal_to_exact_arithmetic_pixel_by_pixel(seed):
     rng = np.random.default_rng(seed)
     points = rng.integers(-8, 40, (9, 3)) / 4.0
     faces = rng.integers(0, 9, (6, 3))
-    seen = rasterize(points, faces, 8, 7)
+    seen = Raster.of(points, faces, 8, 7)
     for row in range(7):
         for column in range(8):
             height = nearest_by_hand(points, faces, column, row)
@@ -97,10 +97,10 @@ def test_equal_to_exact_arithmetic_pixel_by_pixel(seed):
 
 def test_memory_is_that_of_the_picture_also_for_one_huge_face():
     huge = np.array([[-1e4, -1e4, 0.0], [1e4, -1e4, 1], [0, 1e4, 2]]), np.array([[0, 1, 2]])
-    rasterize(*huge, 7, 7)  # loads the kernel before memory is counted
+    Raster.of(*huge, 7, 7)  # loads the kernel before memory is counted
     tracemalloc.start()
     try:
-        seen = rasterize(*huge, 700, 700)
+        seen = Raster.of(*huge, 700, 700)
         peak = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()

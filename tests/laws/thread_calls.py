@@ -244,6 +244,7 @@ def index_of(v: Shared) -> tuple[object, ...]:
     whole.merge([index])
     index.compact()
     index.export(index.folder.with_suffix(".out"))
+    index.prune(v.folder)
     found = index.verify().damages, whole.records(), whole.thumbnail("three")
     return index.records(), index.recipes(), found
 
@@ -342,6 +343,9 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "brain_print": lambda v: es.modes.brain_print({"lh": v.animal, "rh": v.ball}, 9),
     "BrainPrint.asymmetry": lambda v: brain(v).asymmetry(),
     "BrainPrint.distances": lambda v: brain(v).distances(brain(v)),
+    "CondensedFeatures.table": lambda v: es.features.condense(v.animal, v.animal.vertices).table(
+        ["x", "y", "z"]
+    ),
     "condense": lambda v: es.features.condense(v.animal, v.heat),
     "parcellate": lambda v: es.features.parcellate(v.animal, v.heat, v.halves),
     "read_parcellation": lambda v: es.io.read_parcellation(v.folder / "halves.annot", v.animal),
@@ -547,6 +551,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         es.retrieval.find_heat_features(v.animal, accuracy=0.01),
     ],
     "find_items": lambda v: es.io.find_items(v.meshes),
+    "PartDecomposition.smooth": lambda v: (found := es.find_parts(v.animal)).smooth(found.parts),
     "find_parts": lambda v: es.find_parts(v.animal).parts,
     "flat_torus_eigenvalues": lambda v: es.shapes.flat_torus_eigenvalues(9, np.eye(2)),
     "flatten_conformally": lambda v: es.calculus.flatten_conformally(v.grid),
@@ -647,7 +652,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     ],
     "orient_outward": lambda v: es.geometry.orient_outward(v.many),
     "part_colors": lambda v: es.plot.part_colors(v.animal, v.labels),
-    "part_spectrum": lambda v: es.features.part_spectrum(v.animal),
     "part_tree": lambda v: es.features.part_tree(v.animal, v.spectrum),
     "partial_scan": lambda v: es.partial_scan(v.many, [0, 0, 1], resolution=100),
     "patch_descriptor": lambda v: es.retrieval.patch_descriptor([v.patches[0]], v.recipe),
@@ -807,7 +811,10 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         es.collections.build_collection(v.bones, v.folder / secrets.token_hex(8)).points
     ),
     "open_collection": lambda v: es.collections.open_collection(v.collection.folder).points,
+    "MeshAttributes.plain": lambda v: es.io.MeshAttributes.plain(v.ball),
+    "Parcellation.require_vertices": lambda v: v.halves.require_vertices(v.animal.n_vertices),
     "Collection.number": lambda v: v.collection.number("two"),
+    "Collection.read_placed": lambda v: v.collection.read_placed("two", v.collection.points[0]),
     "Collection.read_specimen": lambda v: v.collection.read_specimen("two"),
     "carry_landmarks": lambda v: es.collections.carry_landmarks(v.collection, {"one": v.tip}),
     "CarriedLandmarks.save": lambda v: written(

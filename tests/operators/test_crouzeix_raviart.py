@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
+from eigenshape._corners import longest_edges
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.facets import facet_table
 from eigenshape.geometry.mesh import TriangleMesh
@@ -13,7 +14,6 @@ from eigenshape.operators.crouzeix_raviart import (
     TRIANGLE,
     crouzeix_raviart_laplacian,
     interpolation_constants,
-    longest_edges,
     mass_floor,
 )
 from eigenshape.operators.laplacian import Laplacian

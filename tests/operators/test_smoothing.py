@@ -126,7 +126,7 @@ def test_bad_reach_and_faces_without_area_are_refused():
 
 
 def test_equations_that_cannot_be_solved_are_named(monkeypatch):
-    monkeypatch.setattr("eigenshape.operators.smoothing.factor_matrix", lambda *_: None)
+    monkeypatch.setattr("eigenshape.operators.smoothing.SymmetricFactor.of", lambda *_: None)
     with pytest.raises(
         InvalidShapeError, match=r"must have angles well above 0 for .*; some have angles so close"
     ):

@@ -163,6 +163,17 @@ def test_remove(index):
         index.remove("nobody")
 
 
+def test_shapes_whose_files_are_gone_are_pruned(index, tmp_path):
+    there, gone, elsewhere = (tmp_path / name for name in ("a/there", "a/gone", "b/gone"))
+    there.parent.mkdir()
+    there.touch()
+    for number, source in enumerate((there, gone, elsewhere)):
+        keep(index, f"shape {number}", [descriptor(number)], source=str(source))
+    assert index.prune(tmp_path / "a") == ["shape 1"]
+    assert index.prune(tmp_path / "a") == []
+    assert [record.name for record in index.records()] == ["shape 0", "shape 2"]
+
+
 @settings(deadline=None, max_examples=10)
 @given(st.lists(st.tuples(st.sampled_from("abcd"), st.booleans()), max_size=12))
 def test_index_behaves_like_a_dict(tmp_path_factory, steps):

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from eigenshape.scans.raster import rasterize
+from eigenshape.scans.raster import Raster
 from eigenshape.shapes.surfaces import icosphere
 
 QUAD = np.array([[0, 1, 2], [0, 2, 3]])
@@ -13,7 +13,7 @@ def square(left, top, right, bottom, height=0.0):
 
 
 def test_a_square_covers_exactly_its_pixels():
-    seen = rasterize(square(2, 1, 5, 4, 0.25), QUAD, 8, 6)
+    seen = Raster.of(square(2, 1, 5, 4, 0.25), QUAD, 8, 6)
     expected = np.zeros((6, 8), dtype=bool)
     expected[1:4, 2:5] = True
     np.testing.assert_array_equal(seen.face >= 0, expected)
@@ -23,9 +23,9 @@ def test_a_square_covers_exactly_its_pixels():
 
 
 def test_faces_share_the_diagonal_and_the_lower_one_wins_it():
-    seen = rasterize(square(0, 0, 3, 3), QUAD, 3, 3)
+    seen = Raster.of(square(0, 0, 3, 3), QUAD, 3, 3)
     assert seen.face.tolist() == [[0, 0, 0], [1, 0, 0], [1, 1, 0]]
-    assert rasterize(square(0, 0, 3, 3), QUAD[::-1], 3, 3).face.tolist() == [
+    assert Raster.of(square(0, 0, 3, 3), QUAD[::-1], 3, 3).face.tolist() == [
         [0, 1, 1],
         [0, 0, 1],
         [0, 0, 0],
@@ -36,7 +36,7 @@ def test_faces_share_the_diagonal_and_the_lower_one_wins_it():
 def test_weights_give_the_middle_of_the_pixel(turned):
     points = np.array([[0.3, 0.2, 1.0], [7.1, 1.9, 3.0], [2.2, 6.8, -2.0]])
     faces = np.array([[0, 2, 1] if turned else [0, 1, 2]])
-    seen = rasterize(points, faces, 8, 8)
+    seen = Raster.of(points, faces, 8, 8)
     row, column = np.nonzero(seen.face == 0)
     assert len(row) > 10
     there = np.einsum(
@@ -52,7 +52,7 @@ def test_weights_give_the_middle_of_the_pixel(turned):
 def test_the_nearer_face_is_seen(order):
     points = np.concatenate([square(0, 0, 4, 4, 1.0), square(2, 0, 4, 4, 2.0)])
     faces = np.concatenate([QUAD, QUAD + 4])[::order]
-    seen = rasterize(points, faces, 4, 4)
+    seen = Raster.of(points, faces, 4, 4)
     assert (seen.depth[:, :2] == 1).all()
     assert (seen.depth[:, 2:] == 2).all()
     assert set(faces[seen.face[:, 2:]].ravel().tolist()) <= {4, 5, 6, 7}
@@ -60,7 +60,7 @@ def test_the_nearer_face_is_seen(order):
 
 def test_of_equal_heights_the_lower_face_is_seen():
     points = np.concatenate([square(0, 0, 4, 4)] * 3)
-    seen = rasterize(points, np.concatenate([QUAD + 8, QUAD, QUAD + 4]), 4, 4)
+    seen = Raster.of(points, np.concatenate([QUAD + 8, QUAD, QUAD + 4]), 4, 4)
     assert set(seen.face.ravel().tolist()) == {0, 1}
 
 
@@ -86,7 +86,7 @@ def test_the_picture_is_that_of_a_search_of_all_pixels(width, height, scale):
     rng = np.random.default_rng(4)
     points = rng.random((90, 3)) * scale  # at the larger scale faces end beyond the picture
     faces = rng.integers(0, 90, (60, 3))
-    seen = rasterize(points, faces, width, height)
+    seen = Raster.of(points, faces, width, height)
     depth, face = buffer_of_all_pixels(points, faces, width, height)
     np.testing.assert_array_equal(seen.face, face)
     np.testing.assert_allclose(seen.depth, depth, rtol=1e-9)
@@ -95,7 +95,7 @@ def test_the_picture_is_that_of_a_search_of_all_pixels(width, height, scale):
 def test_a_sphere_has_no_pinholes():
     ball = icosphere(3)
     points = ball.vertices * 60 + 64
-    seen = rasterize(points, ball.faces, 128, 128)
+    seen = Raster.of(points, ball.faces, 128, 128)
     y, x = np.indices((128, 128)) + 0.5
     distance = np.hypot(x - 64, y - 64)
     assert (seen.face[distance < 58] >= 0).all()  # its flat faces reach within 1 % of 60
@@ -105,12 +105,12 @@ def test_a_sphere_has_no_pinholes():
 
 
 def test_what_is_outside_of_the_picture_is_cut_off():
-    seen = rasterize(square(-3, -3, 2, 9), QUAD, 4, 4)
+    seen = Raster.of(square(-3, -3, 2, 9), QUAD, 4, 4)
     assert (seen.face[:, :2] >= 0).all()
     assert (seen.face[:, 2:] == -1).all()
-    assert (rasterize(square(10, 10, 20, 20), QUAD, 4, 4).face == -1).all()
+    assert (Raster.of(square(10, 10, 20, 20), QUAD, 4, 4).face == -1).all()
 
 
 def test_a_face_seen_from_its_edge_covers_nothing():
     points = np.array([[0.0, 0.5, 0], [4, 0.5, 0], [2, 0.5, 9]])
-    assert (rasterize(points, np.array([[0, 1, 2]]), 4, 4).face == -1).all()
+    assert (Raster.of(points, np.array([[0, 1, 2]]), 4, 4).face == -1).all()

@@ -14,11 +14,11 @@ from certeig.kit.progress import Progress, silent
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike, Integer
 from certeig.solver.certified import certified_pairs
-from certeig.solver.certify import certify_pairs, in_user_units
+from certeig.solver.certify import certify_pairs
 from certeig.solver.inertia import count_below_shift
 from certeig.solver.origin import pencil_from_zero
-from certeig.solver.pencil import normalize, to_user_vectors
-from certeig.sparse.symmetric_factor import SymmetricFactor, factor_matrix
+from certeig.solver.pencil import Pencil
+from certeig.sparse.symmetric_factor import SymmetricFactor
 from certeig.spectrum import Spectrum
 
 
@@ -116,10 +116,10 @@ def eigenpairs(  # noqa: PLR0913 - one keyword for each choice of pairs
         report(0.0, "scaling the matrices")
         pencil = pencil_from_zero(stiffness, mass)
         pairs, certificate = certified_pairs(pencil, wanted, interval, report)
-        vectors = to_user_vectors(pencil, pairs.vectors)
+        vectors = pencil.to_user_vectors(pairs.vectors)
         # A shift beyond the range of floats is as good as infinite.
         with np.errstate(over="ignore"):
-            proof, values = in_user_units(pencil, certificate), pencil.places_out(pairs.values)
+            proof, values = pencil.certificate_out(certificate), pencil.places_out(pairs.values)
     bad = np.flatnonzero(~np.isfinite(values))
     if bad.size:
         raise InvalidParameterError(
@@ -169,7 +169,7 @@ def count_below(W: Any, B: Any = None, value: float = 0.0) -> int:
     """
     matrices, sigma = _matrices(W, B), finite_number(value, "value")
     with one_blas_thread():
-        pencil = normalize(*matrices)
+        pencil = Pencil.scaled(*matrices)
         # A value beyond the range of floats in the pencil's units is as good as infinite.
         with np.errstate(over="ignore"):
             shift = float(pencil.places_in(np.array([sigma]))[0])
@@ -249,7 +249,7 @@ def factorize(matrix: Any) -> SymmetricFactor:
     >>> factor.n_negative
     0
     """
-    factor = factor_matrix(_as_sparse("matrix", matrix))
+    factor = SymmetricFactor.of(_as_sparse("matrix", matrix))
     if factor is None:
         raise InvalidParameterError(
             "matrix must have a factor with its pivots on the diagonal; a pivot is zero or overflows. "

@@ -2,12 +2,12 @@ import numpy as np
 from known_spectra import kronecker_sum, ring, scaled
 
 from certeig.solver.eigenpairs import Pairs, lowest_pairs, polish
-from certeig.solver.factor import factorize
+from certeig.solver.factor import Factor
 from certeig.solver.lanczos import Wanted, block_lanczos
 from certeig.solver.pencil import rayleigh_residuals
 
 PENCIL = scaled(kronecker_sum(ring(25), ring(26)))
-FACTOR = factorize(PENCIL, 0.02 * PENCIL.level)
+FACTOR = Factor.at(PENCIL, 0.02 * PENCIL.level)
 
 
 def found_pairs():

@@ -5,7 +5,7 @@ from known_spectra import dense_values, full_parts, kronecker_sum, random_grid, 
 from certeig.kit.errors import ConvergenceError
 from certeig.solver import lanczos
 from certeig.solver.eigenpairs import lowest_pairs
-from certeig.solver.factor import factorize
+from certeig.solver.factor import Factor
 from certeig.solver.lanczos import MOST_LOST, Wanted, block_lanczos
 from certeig.solver.pencil import rayleigh_residuals
 
@@ -19,7 +19,7 @@ def test_finds_both_sides_of_the_shift_orthonormal():
     matrices = random_grid(25, full=True)
     pencil = scaled(*matrices)
     reference = pencil.places_in(dense_values(*matrices))
-    factor = factorize(pencil, float(reference[15] + reference[16]) / 2)
+    factor = Factor.at(pencil, float(reference[15] + reference[16]) / 2)
     assert factor.count == 16
     vectors = run(pencil, factor, Wanted(below=16, above=9))
     np.testing.assert_allclose(vectors.T @ pencil.weigh(vectors), np.eye(25), atol=1e-8)
@@ -32,7 +32,7 @@ def test_finds_both_sides_of_the_shift_orthonormal():
 
 def test_skipped_projections_cost_no_digit(monkeypatch):
     pencil = scaled(*random_grid(57))
-    factor = factorize(pencil, 0.05 * pencil.level)
+    factor = Factor.at(pencil, 0.05 * pencil.level)
     residuals = {}
     for most in (MOST_LOST, 0.0):
         monkeypatch.setattr(lanczos, "MOST_LOST", most)
@@ -43,7 +43,7 @@ def test_skipped_projections_cost_no_digit(monkeypatch):
 
 def test_a_second_run_is_orthogonal_to_the_first_to_rounding():
     pencil = scaled(kronecker_sum(ring(25), ring(26)))
-    factor = factorize(pencil, 0.05 * pencil.level)
+    factor = Factor.at(pencil, 0.05 * pencil.level)
     found = run(pencil, factor, Wanted(below=factor.count, above=12))
     first = lowest_pairs(pencil, found, found.shape[1]).vectors
     second = run(pencil, factor, Wanted(below=0, above=20), locked=first)
@@ -52,7 +52,7 @@ def test_a_second_run_is_orthogonal_to_the_first_to_rounding():
 
 def test_a_second_run_finds_the_copies_that_the_block_was_too_narrow_for():
     pencil = scaled(full_parts(100))  # the eigenvalue 0 a hundred times
-    factor = factorize(pencil, 0.01 * pencil.level)
+    factor = Factor.at(pencil, 0.01 * pencil.level)
     assert factor.count == 100
     first = run(pencil, factor, Wanted(below=5, above=0))
     second = run(pencil, factor, Wanted(below=5, above=0), locked=first)
@@ -64,7 +64,7 @@ def test_a_second_run_finds_the_copies_that_the_block_was_too_narrow_for():
 
 def test_nothing_above_the_ceiling_is_returned():
     pencil = scaled(string(300))
-    factor = factorize(pencil, 0.002)
+    factor = Factor.at(pencil, 0.002)
     below = factor.count
     everything = run(pencil, factor, Wanted(below=below, above=5))
     values = np.sort(rayleigh_residuals(pencil, everything)[0])
@@ -74,6 +74,6 @@ def test_nothing_above_the_ceiling_is_returned():
 
 def test_too_little_room_is_an_error():
     pencil = scaled(string(40))
-    factor = factorize(pencil, 0.1)
+    factor = Factor.at(pencil, 0.1)
     with pytest.raises(ConvergenceError, match=r"Block Lanczos must converge within 32 vectors"):
         run(pencil, factor, Wanted(below=factor.count, above=40))

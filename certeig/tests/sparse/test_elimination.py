@@ -10,11 +10,11 @@ from known_spectra import adjacency, kronecker_sum, laplacian, random_symmetric,
 from certeig.sparse import dissection
 from certeig.sparse.elimination import analyze_pattern
 from certeig.sparse.front_loops import WIDE
-from certeig.sparse.symmetric_factor import factorize_symmetric
+from certeig.sparse.symmetric_factor import SymmetricFactor
 
 
 def solved(matrix, width=3):
-    factor = factorize_symmetric(analyze_pattern(matrix), matrix.data)
+    factor = SymmetricFactor.of_entries(analyze_pattern(matrix), matrix.data)
     right = np.random.default_rng(0).normal(size=(matrix.shape[0], width))
     return factor, right, factor.solve(right)
 
@@ -80,7 +80,7 @@ def test_surfaces_and_solids_below_zero_and_among_their_eigenvalues(matrix):
     elimination = analyze_pattern(stiffness)
     for shift, negative in ((-0.1, 0), (0.1 * stiffness.diagonal().mean(), None)):
         matrix = sp.csc_array(stiffness - shift * sp.eye_array(n))
-        factor = factorize_symmetric(elimination, matrix.data)
+        factor = SymmetricFactor.of_entries(elimination, matrix.data)
         right = np.random.default_rng(1).normal(size=(n, 11))
         np.testing.assert_allclose(matrix @ factor.solve(right), right, atol=1e-8)
         count = np.count_nonzero(factor.pivots < 0)
@@ -127,14 +127,16 @@ def test_a_pivot_that_is_none(bad):
     chain = sp.csc_array(
         sp.diags_array([-np.ones(9), np.full(10, 2.0), -np.ones(9)], offsets=[-1, 0, 1])
     )
-    assert factorize_symmetric(analyze_pattern(chain), chain.data) is not None
+    assert SymmetricFactor.of_entries(analyze_pattern(chain), chain.data) is not None
     alone = sp.csc_array(sp.eye_array(4))
-    assert factorize_symmetric(analyze_pattern(alone), np.array([1.0, bad, 1.0, 1.0])) is None
+    assert (
+        SymmetricFactor.of_entries(analyze_pattern(alone), np.array([1.0, bad, 1.0, 1.0])) is None
+    )
 
 
 def test_nothing_depends_on_the_run():
     matrix = sp.csc_array(surface(2000) + 0.1 * sp.eye_array(2000))
-    one, two = (factorize_symmetric(analyze_pattern(matrix), matrix.data) for _ in range(2))
+    one, two = (SymmetricFactor.of_entries(analyze_pattern(matrix), matrix.data) for _ in range(2))
     np.testing.assert_array_equal(one.panels, two.panels)
 
 
@@ -148,7 +150,7 @@ def test_the_bound_of_rounding_is_that_of_the_factor_in_any_unit():
     sizes = (np.abs(lower) @ np.abs(lower.T)).sum(axis=1)
     lengths = np.arange(1, 3 * WIDE + 1)
     for unit in (1.0, 2.0**40):
-        found = factorize_symmetric(elimination, sp.csc_array(unit * matrix).data).rounding()
+        found = SymmetricFactor.of_entries(elimination, sp.csc_array(unit * matrix).data).rounding()
         share = found[elimination.order] / (unit * np.finfo(np.float64).eps * sizes)
         assert (share <= lengths + 5).all()
         assert (share >= 4).all()

@@ -12,7 +12,7 @@ from known_spectra import adjacency, kronecker_sum, random_symmetric, surface
 import certeig
 from certeig.sparse.dissection import dissect
 from certeig.sparse.elimination import analyze_pattern
-from certeig.sparse.symmetric_factor import factorize_symmetric
+from certeig.sparse.symmetric_factor import SymmetricFactor
 
 
 @pytest.fixture(autouse=True)
@@ -48,7 +48,7 @@ def test_digits_are_those_of_one_thread(name):
     for n in (1, 2, 4):
         certeig.set_threads(n)
         elimination = analyze_pattern(matrix)
-        factor = factorize_symmetric(elimination, matrix.data)
+        factor = SymmetricFactor.of_entries(elimination, matrix.data)
         arrays = elimination.order, factor.panels, factor.pivots, factor.solve(right)
         found.append([array.tobytes() for array in arrays])
     assert found[0] == found[1] == found[2]
@@ -74,7 +74,7 @@ def test_tasks_solve_what_they_share(n, density, seed):
     for front, parent in enumerate(elimination.above.tolist()):
         if parent >= 0 and task_of[parent] != task_of[front]:
             assert round_of[task_of[front]] < round_of[task_of[parent]]
-    factor = factorize_symmetric(elimination, matrix.data)
+    factor = SymmetricFactor.of_entries(elimination, matrix.data)
     assert np.count_nonzero(factor.pivots < 0) == np.count_nonzero(
         np.linalg.eigvalsh(matrix.toarray()) < 0
     )
@@ -90,7 +90,7 @@ def test_a_pivot_that_is_zero_is_found_in_any_task():
         data[matrix.indptr[point] : matrix.indptr[point + 1]] = np.nan
         for n in (1, 2):
             certeig.set_threads(n)
-            assert factorize_symmetric(elimination, data) is None
+            assert SymmetricFactor.of_entries(elimination, data) is None
 
 
 def test_threads_order_a_graph_as_one_does():

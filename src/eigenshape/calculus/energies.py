@@ -9,7 +9,8 @@ from certeig.kit.arrays import whole_number
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike, Integer
 from eigenshape.calculus.linear_solver import factor_equations
-from eigenshape.operators.laplacian import Laplacian, require_matrix
+from eigenshape.operators.laplacian import Laplacian
+from eigenshape.operators.requirements import require_matrix
 
 # Each order multiplies the condition number by that of the operator, 1e3 to 1e6.
 MOST_ORDER = 8

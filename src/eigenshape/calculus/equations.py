@@ -13,11 +13,12 @@ from eigenshape._arrays import point_functions, step_number, vertex_values
 from eigenshape._errors import InvalidShapeError
 from eigenshape.calculus.linear_solver import factor_definite, factor_equations
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
-from eigenshape.geometry.facets import boundary_facets
+from eigenshape.geometry.facets import facet_table
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import boundary_vertices
 from eigenshape.operators import elements
-from eigenshape.operators.laplacian import Laplacian, require_matrix
+from eigenshape.operators.laplacian import Laplacian
+from eigenshape.operators.requirements import require_matrix
 
 # Differences from a mean up to this share of the value are the rounding of sums of up to a million
 # numbers.
@@ -302,7 +303,8 @@ def boundary_load(mesh: MeshLike, flux: ArrayLike) -> Float[np.ndarray, " n"]:
     if mesh.dim == 1:
         load[rim] = strength[rim]  # the boundary of a curve is points, of measure 1
         return load
-    edge = SimplicialMesh(mesh.points[rim], np.searchsorted(rim, boundary_facets(mesh)))
+    table = facet_table(mesh)
+    edge = SimplicialMesh(mesh.points[rim], np.searchsorted(rim, table.facets[table.boundary]))
     load[rim] = elements.mass(edge, edge.simplices, 1) @ strength[rim]
     return load
 

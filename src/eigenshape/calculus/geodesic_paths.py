@@ -12,6 +12,7 @@ from certeig.kit.arrays import whole_numbers
 from certeig.kit.errors import ConvergenceError, InvalidParameterError
 from certeig.kit.typing import ArrayLike, Integer
 from eigenshape._vectors import scale_to_unit
+from eigenshape.calculus.places import require_one, vertex_number
 from eigenshape.calculus.unfolding import (
     STRAIGHT,
     GeodesicPath,
@@ -28,17 +29,9 @@ from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.distances.closest import closest_points
 from eigenshape.geometry.measure import edge_lengths
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.requirements import require_sound
-from eigenshape.geometry.samples.surface_points import (
-    SurfacePoints,
-    require_on,
-    require_one,
-    vertex_number,
-)
+from eigenshape.geometry.requirements import require_oriented_manifold, require_sound
+from eigenshape.geometry.samples.surface_points import SurfacePoints, require_on
 from eigenshape.geometry.topology import edge_table
-from eigenshape.operators.directions import (
-    require_oriented_manifold,
-)
 
 # Rounds in which pivots are passed on their other side; a path of k edges takes about √k.
 ROUNDS = 10_000

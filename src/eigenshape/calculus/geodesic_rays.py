@@ -7,6 +7,7 @@ from certeig.kit.arrays import finite_values
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike, Integer
 from eigenshape._vectors import scale_to_unit
+from eigenshape.calculus.places import require_one, vertex_number
 from eigenshape.calculus.unfolding import (
     STRAIGHT,
     GeodesicPath,
@@ -22,14 +23,9 @@ from eigenshape.calculus.unfolding import (
 )
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.requirements import require_sound
-from eigenshape.geometry.samples.surface_points import (
-    SurfacePoints,
-    require_on,
-    require_one,
-    vertex_number,
-)
-from eigenshape.operators.directions import require_oriented_manifold, vertex_directions
+from eigenshape.geometry.requirements import require_oriented_manifold, require_sound
+from eigenshape.geometry.samples.surface_points import SurfacePoints, require_on
+from eigenshape.operators.directions import vertex_directions
 
 
 def trace_geodesic(

@@ -4,12 +4,13 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
 
-from certeig.kit.arrays import ReadOnly, positive_number, record, whole_numbers
+from certeig.kit.arrays import ReadOnly, positive_number, record
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.progress import Progress, silent
 from certeig.kit.typing import ArrayLike
 from certeig.sparse.symmetric_factor import SymmetricFactor
-from eigenshape._corners import in_length
+from eigenshape._arrays import NO_SOURCE, source_sets
+from eigenshape._corners import edges_of, in_length
 from eigenshape._vectors import size_one
 from eigenshape.calculus.linear_solver import (
     GroundedFactor,
@@ -18,8 +19,6 @@ from eigenshape.calculus.linear_solver import (
 )
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import ShapeLike, as_shape
-from eigenshape.geometry.distances.geodesic import source_sets
-from eigenshape.geometry.homology import edges_of
 from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplices import simplex_volumes
 from eigenshape.geometry.simplicial import SimplicialMesh
@@ -31,7 +30,6 @@ from eigenshape.operators.robust import delaunay_cover
 # Sources that are solved for together: the lanes of a factor, and few enough that the gradients of
 # all simplices fit in the cache.
 SOURCES_AT_ONCE = 8
-NO_SOURCE = "There must be at least one source; there is none."
 
 
 @record
@@ -287,17 +285,6 @@ def heat_distances(
                 shifts = np.where(counts > 0, -sums / counts, np.inf)
             rows[first + column] = found[:, column] + shifts[solver.components]
     return in_length(rows, solver.scale, 1)
-
-
-def require_sources(sources: ArrayLike, n_points: int) -> Int[np.ndarray, " k"]:
-    """Return sources as integers.
-
-    Raise InvalidParameterError if there is none, or one is not a point.
-    """
-    wanted = whole_numbers(sources, "A source", 0, n_points - 1)
-    if not wanted.size:
-        raise InvalidParameterError(NO_SOURCE)
-    return wanted
 
 
 def require_heat(

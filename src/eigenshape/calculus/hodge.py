@@ -19,10 +19,9 @@ from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.facets import facet_table
 from eigenshape.geometry.homology import betti_numbers
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.requirements import require_sound
+from eigenshape.geometry.requirements import require_oriented_manifold, require_sound
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.crouzeix_raviart import crouzeix_raviart_laplacian
-from eigenshape.operators.directions import require_oriented_manifold
 
 Rim = Literal["tangential", "normal"]
 

@@ -13,7 +13,7 @@ from certeig.kit.errors import InvalidParameterError
 from certeig.kit.matrices import as_symmetric, find_zero_row_sums, require_points
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike
-from certeig.sparse.symmetric_factor import SymmetricFactor, factor_matrix
+from certeig.sparse.symmetric_factor import SymmetricFactor
 from eigenshape._arrays import point_functions, require_finite_rows
 from eigenshape._errors import InvalidShapeError
 
@@ -417,7 +417,7 @@ def factor_system(
     free = np.setdiff1d(np.arange(n), np.concatenate([held, pins]))
     rows = system[free]
     block, coupling = rows[:, free], rows[:, held]
-    factor = factor_matrix(block) if len(free) else None
+    factor = SymmetricFactor.of(block) if len(free) else None
     if len(free) and factor is None:
         raise InvalidParameterError(SINGULAR.format("a pivot is 0"))
     if factor is not None:
@@ -502,7 +502,7 @@ def factorize_definite(matrix: sp.sparray) -> SymmetricFactor:
     Raise InvalidShapeError if rounding makes a pivot vanish, as it may where simplices are
     extremely thin.
     """
-    factor = factor_matrix(matrix)
+    factor = SymmetricFactor.of(matrix)
     if factor is None:
         raise InvalidShapeError(
             "Simplices must have angles well above 0 for the equations to be factored; some are "

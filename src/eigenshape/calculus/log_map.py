@@ -9,6 +9,7 @@ from certeig.kit.arguments import require_choice
 from certeig.kit.arrays import whole_number
 from certeig.kit.typing import Integer
 from eigenshape._corners import in_length, side_ends
+from eigenshape.calculus.places import require_one, vertex_number
 from eigenshape.calculus.unfolding import flat_corners
 from eigenshape.calculus.vector_heat import (
     MeshVectorHeat,
@@ -24,12 +25,7 @@ from eigenshape.calculus.vector_heat import (
     side_vectors,
 )
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.samples.surface_points import (
-    SurfacePoints,
-    require_on,
-    require_one,
-    vertex_number,
-)
+from eigenshape.geometry.samples.surface_points import SurfacePoints, require_on
 from eigenshape.operators.directions import corner_products
 
 LogMethod = Literal["affine", "adaptive", "radial"]

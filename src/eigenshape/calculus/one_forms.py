@@ -9,12 +9,12 @@ from certeig.kit.arrays import real_numbers
 from certeig.kit.errors import ConvergenceError, InvalidParameterError
 from certeig.kit.typing import ArrayLike
 from eigenshape._arrays import require_finite_rows
+from eigenshape._corners import edges_of
 from eigenshape._errors import InvalidShapeError
 from eigenshape.calculus.hodge import HodgeDecomposition, Rim
 from eigenshape.calculus.linear_solver import factorize_definite, factorize_grounded
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.facets import facet_table
-from eigenshape.geometry.homology import edges_of
 from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.operators import elements

@@ -4,9 +4,8 @@ import numpy as np
 from jaxtyping import Complex, Float, Int
 
 from certeig.kit.arrays import ReadOnly, record
-from eigenshape._corners import in_length, side_ends
+from eigenshape._corners import face_angles, in_length, side_ends
 from eigenshape._vectors import size_one
-from eigenshape.geometry.curvature import face_angles
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.operators.directions import side_twins
 

@@ -9,10 +9,10 @@ from certeig.kit.errors import InvalidParameterError
 from certeig.kit.progress import Progress, silent
 from certeig.kit.typing import ArrayLike
 from certeig.sparse.symmetric_factor import SymmetricFactor
-from eigenshape._arrays import require_finite_rows
+from eigenshape._arrays import require_finite_rows, require_sources
 from eigenshape._corners import in_length, side_ends
 from eigenshape._vectors import scale_to_unit, size_one
-from eigenshape.calculus.heat_distance import require_heat, require_sources
+from eigenshape.calculus.heat_distance import require_heat
 from eigenshape.calculus.linear_solver import (
     GroundedFactor,
     factorize_definite,

@@ -6,6 +6,7 @@ from scipy.ndimage import gaussian_filter
 from certeig.kit.arrays import real_numbers
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike
+from eigenshape._arrays import as_affine, different_values
 from eigenshape.calculus.flows import taubin_smooth
 from eigenshape.calculus.level_sets import level_set
 from eigenshape.geometry.mesh import TriangleMesh
@@ -105,32 +106,3 @@ def voxel_surface(inside: ArrayLike, to_space: ArrayLike | None = None) -> Trian
     mirrored = np.linalg.slogdet(affine[:3, :3])[0] < 0
     faces = surface.faces[:, ::-1] if mirrored else surface.faces
     return TriangleMesh(smooth.points @ affine[:3, :3].T + affine[:3, 3], faces)
-
-
-def as_affine(to_space: ArrayLike | None) -> np.ndarray:
-    """Return an affine map of space as a matrix, by default that which changes nothing.
-
-    Raise InvalidParameterError if it is no such matrix or cannot be inverted.
-    """
-    if to_space is None:
-        return np.eye(4)
-    matrix = real_numbers(to_space, "to_space").astype(np.float64)
-    if (
-        matrix.shape != (4, 4)
-        or not np.isfinite(matrix).all()
-        or not np.array_equal(matrix[3], [0, 0, 0, 1])
-        or np.linalg.matrix_rank(matrix[:3, :3]) < 3
-    ):
-        given = matrix.tolist() if matrix.size <= 16 else "larger"
-        raise InvalidParameterError(
-            "to_space must be an affine map that can be inverted, finite numbers of shape (4, 4) whose "
-            f"last row is 0, 0, 0, 1; it is {given}, of shape {matrix.shape}."
-        )
-    return matrix
-
-
-def different_values(table: np.ndarray, most: int, noun: str) -> str:
-    """List the different values of a table, the first of them if they are too many."""
-    there = np.unique(table)
-    ending = f", ... ({len(there)} {noun})" if len(there) > most else ""
-    return ", ".join(f"{value:g}" for value in there[:most].astype(float)) + ending

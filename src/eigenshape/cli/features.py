@@ -34,7 +34,6 @@ from eigenshape.cli.inputs import (
     repair_names,
     require_one_rule,
 )
-from eigenshape.retrieval.heat.recipe import PRESETS
 
 COLUMNS = {
     "feature": "feature",
@@ -91,7 +90,7 @@ def features(
     )
     side = steps.picture_side(view, up, picture, shapes=[mesh])
     steps.require_mesh_path(output, colors=True)
-    recipe = PRESETS[method]
+    recipe = steps.PRESETS[method]
     surface = steps.load_surface(mesh, repair)
     with progress_bar("features") as progress:
         shape = steps.find_features(surface, recipe, accuracy, progress)

@@ -97,7 +97,8 @@ def add(
         report = steps.describe_all(
             opened, items, recipe, processes, repairs=repairs, n_views=views
         )
-    pruned = steps.prune(opened, sources) if prune else []
+    folders = [source for source in sources if source.is_dir()]
+    pruned = opened.prune(*folders) if prune else []
     if as_json:
         facts = {"index": index, "shapes": len(opened), **result_facts(report)}
         print_json(facts | {"pruned": pruned})
@@ -172,7 +173,7 @@ def stats(index: Path, *, as_json: bool = False) -> None:
     labels = Counter(record.label for record in records)
     recipes = Counter(str(recipe.name) for record in records for recipe in record.recipes)
     n_bytes = sum(path.stat().st_size for path in index.rglob("*") if path.is_file())
-    stage = steps.read_stage(index)
+    stage = opened.stage
     if as_json:
         print_json(
             {

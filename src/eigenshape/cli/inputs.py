@@ -6,13 +6,12 @@ from typing import Annotated, Literal
 import typer
 
 from certeig.kit.errors import InvalidParameterError
-from eigenshape.geometry.repairs.repair_names import CLOUD_REPAIRS, MESH_REPAIRS, require_repairs
+from eigenshape.geometry.repairs.repair_names import KNOWN_REPAIRS, require_repairs
 from eigenshape.io.formats.registry import MESH_FORMATS, POINT_FORMATS, WRITTEN
 
 # The repair of verbs that bend or cut a surface: it would come apart along the seams of a texture,
 # where each vertex is there twice.
 SEAMS = "weld_seams"
-KNOWN_REPAIRS = tuple(dict.fromkeys((*MESH_REPAIRS, *CLOUD_REPAIRS)))
 # What is said of a parameter of this name in each verb whose docstring says nothing else. After the
 # colon stands what help calls the value.
 SHARED_PARAMETERS = f"""\

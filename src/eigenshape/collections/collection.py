@@ -10,8 +10,10 @@ from jaxtyping import Float
 from certeig.kit.arrays import ReadOnly, record
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.files import as_path, content_digest, replace_file
+from certeig.kit.typing import ArrayLike
+from eigenshape._arrays import finite_rows
 from eigenshape._errors import InvalidShapeError, StoreError
-from eigenshape.collections.alignment import MIRROR, Side
+from eigenshape.collections.alignment import MIRROR, Side, best_similarity
 from eigenshape.collections.parts import SPECIMENS, read_state
 from eigenshape.collections.spread_points import main_pieces
 from eigenshape.collections.surface_fit import SurfaceFit
@@ -125,6 +127,38 @@ class Collection(ReadOnly):
                 "has changed. Build the collection again."
             )
         return read_specimen(source)[0]
+
+    def read_placed(self, name: str, onto: ArrayLike) -> TriangleMesh:
+        """Read the surface of a specimen, mirrored back if it is reflected, and placed by its points.
+
+        Parameters
+        ----------
+        name : str
+            One of `names`.
+        onto : (n, 3) float
+            Where its points are to lie, such as the vertices of `mean`, in length. A similarity
+            brings them as near as it can.
+
+        Raises
+        ------
+        InvalidParameterError
+            If no specimen has this name.
+        InvalidShapeError
+            If `onto` is not one finite row for each point.
+        StoreError, FileFormatError, OSError
+            As `read_specimen`.
+        """
+        row, mesh = self.number(name), self.read_specimen(name)
+        places = finite_rows(onto, "onto", 3)
+        reflected = self.reflected[row : row + 1]
+        own = unreflect(self.points[row : row + 1], reflected)[0]
+        if len(places) != len(own):
+            raise InvalidShapeError(
+                f"onto must hold one row for each of {len(own)} points; it holds {len(places)}."
+            )
+        placing = best_similarity(own, places, np.ones(len(own)))
+        vertices = placing.move(unreflect(mesh.vertices[None], reflected)[0])
+        return TriangleMesh(vertices, mesh.faces[:, ::-1] if self.reflected[row] else mesh.faces)
 
     def number(self, name: str) -> int:
         """Return the row of a specimen.

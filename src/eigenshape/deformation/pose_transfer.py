@@ -17,7 +17,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import warn_of_seams
 from eigenshape.geometry.simplices import dual_volumes
 from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.spectral.maps.functional_map import FunctionalMap, point_areas, transfer_function
+from eigenshape.spectral.maps.functional_map import FunctionalMap, transfer_function
 from eigenshape.spectral.maps.point_maps import map_from_points
 from eigenshape.spectral.solve import solve_spectrum
 
@@ -134,7 +134,7 @@ def transfer_deformation(
     carried = nearest_rotations(transfer_function(few, turns.reshape(-1, 9)).reshape(-1, 3, 3))
     # How the target stands in space: the rotation that takes the source, carried over to it, nearest
     # to its vertices (Kabsch 1976)
-    areas = point_areas(mapping.target)
+    areas = mapping.target.point_areas
     places = transfer_function(mapping, before.vertices), target.vertices
     one, two = (size_one(points - _center(points, areas))[0] for points in places)
     stand = nearest_rotations((two.T @ (areas[:, None] / areas.sum() * one))[None])[0]

@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import connected_components
 from certeig.kit.arrays import ReadOnly, record
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.threads import one_blas_thread
-from certeig.sparse.symmetric_factor import SymmetricFactor, factor_matrix
+from certeig.sparse.symmetric_factor import SymmetricFactor
 from eigenshape._errors import InvalidShapeError
 from eigenshape._vectors import nearest_rotations
 from eigenshape.deformation.rigidity_loops import fit_rotations, turn_edges
@@ -148,7 +148,7 @@ def factor_equations(
 
     Raise InvalidShapeError if they are not positive definite.
     """
-    factor = factor_matrix(square, similar)
+    factor = SymmetricFactor.of(square, similar)
     if factor is None or not (factor.pivots > 0).all():
         raise InvalidShapeError(
             "Every triangle must have angles well above zero to be bent; the equations of the "

@@ -11,7 +11,6 @@ from .parcellation import parcellate as parcellate
 from .part_merging import part_tree as part_tree
 from .parts import PartDecomposition as PartDecomposition
 from .parts import find_parts as find_parts
-from .parts import part_spectrum as part_spectrum
 from .region_tree import MergeTree as MergeTree
 from .region_tree import PartTree as PartTree
 from .segmentation import FeaturePoints as FeaturePoints

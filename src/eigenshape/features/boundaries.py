@@ -13,7 +13,7 @@ from eigenshape.features.segmentation import Segmentation, adjacent_parts
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.topology import edge_table, face_pairs
+from eigenshape.geometry.topology import edge_table
 from eigenshape.operators.anisotropic import curvature_tensors
 
 # α of `curvature_tensors`, without unit: the strength of creases. The best of 1, 5, 10, 20, 40 and
@@ -140,7 +140,7 @@ def build_network(mesh: TriangleMesh, tensors: Float[np.ndarray, "f 3 3"]) -> _N
     points, _ = scale_to_unit(mesh.vertices)
     unit = TriangleMesh(points, mesh.faces)
     table = edge_table(mesh)  # which this mesh has listed already
-    pairs, edges = face_pairs(table)
+    pairs, edges = table.face_pairs
     centers = points[mesh.faces].mean(axis=1)
     across = centers[pairs[:, 1]] - centers[pairs[:, 0]]
     lengths = np.linalg.norm(across, axis=1)

@@ -1,8 +1,11 @@
 """Regions of similar values on a surface, and the means of the values over them."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from jaxtyping import Float, Int
 
+from certeig.kit.arguments import require_each
 from certeig.kit.arrays import ReadOnly, real_numbers, record
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.threads import one_blas_thread
@@ -49,6 +52,39 @@ class CondensedFeatures(ReadOnly):
     areas: Float[np.ndarray, " r"]
     centers: Float[np.ndarray, "r 3"]
     lost: float
+
+    def table(self, names: Sequence[str]) -> dict[str, np.ndarray]:
+        """Return the regions as a table, a row for each.
+
+        Parameters
+        ----------
+        names : sequence of q str
+            Names of the columns of `values`.
+
+        Returns
+        -------
+        dict of str to (r,) array
+            The number of the region, its center x, y, z, its area and number of vertices, then its
+            values.
+
+        Raises
+        ------
+        InvalidParameterError
+            If there is not one name for each column.
+        """
+        require_each(names, str, "names")
+        if len(names) != self.values.shape[1]:
+            raise InvalidParameterError(
+                f"names must hold one for each of {self.values.shape[1]} columns of values; it holds "
+                f"{len(names)}."
+            )
+        return {
+            "region": np.arange(len(self.areas)),
+            **dict(zip("xyz", self.centers.T, strict=True)),
+            "area": self.areas,
+            "n_vertices": np.bincount(self.labels),
+            **dict(zip(names, self.values.T, strict=True)),
+        }
 
 
 @one_blas_thread()

@@ -14,7 +14,7 @@ from eigenshape.features.region_tree import PartTree
 from eigenshape.features.segmentation import FeaturePoints, Segmentation
 from eigenshape.geometry.creases import smooth_pairs
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.topology import edge_table, face_pairs
+from eigenshape.geometry.topology import edge_table
 
 # A patch is flat if its projection along its mean normal has at least this share of its area:
 # normals are within about 0.8° of the mean.
@@ -80,7 +80,7 @@ def crease_tree(mesh: TriangleMesh, heat: Float[np.ndarray, " n"]) -> PartTree:
     PartTree
         With the persistence o / (1 + o), at least `FINE_CONTRAST`.
     """
-    n_bodies, bodies = label_components(mesh.n_faces, *face_pairs(edge_table(mesh))[0].T)
+    n_bodies, bodies = label_components(mesh.n_faces, *edge_table(mesh).face_pairs[0].T)
     measures = _measure(mesh)
     areas, lengths = measures.areas, measures.lengths
     cuts: list[_Cut] = []
@@ -133,7 +133,7 @@ def _cuts_at_ledges(mesh: TriangleMesh, measures: _Measures) -> Iterator[_Cut]:
     points, vectors = measures.points, measures.vectors
     areas, lengths = measures.areas, measures.lengths
     table = edge_table(mesh)
-    pairs, edges = face_pairs(table)
+    pairs, edges = table.face_pairs
 
     # Patches are bounded by creases. A crease is concave if one face rises above the other.
     smooth = smooth_pairs(mesh)

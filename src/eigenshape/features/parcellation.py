@@ -84,6 +84,25 @@ class Parcellation(ReadOnly):
         object.__setattr__(self, "names", tuple(chosen))
         object.__setattr__(self, "colors", freeze(shades))
 
+    def require_vertices(self, n_vertices: int) -> None:
+        """Raise an error if the parcels are not those of a surface with so many vertices.
+
+        Parameters
+        ----------
+        n_vertices : int
+            Number of vertices of the surface.
+
+        Raises
+        ------
+        InvalidParameterError
+            If there is not one label for each.
+        """
+        if len(self.labels) != n_vertices:
+            raise InvalidParameterError(
+                f"A parcellation must have a label for each of {n_vertices} vertices; it has "
+                f"{len(self.labels)}, so it belongs to another surface."
+            )
+
 
 def parcellate(
     mesh: MeshLike, values: ArrayLike, parcellation: Parcellation
@@ -119,7 +138,8 @@ def parcellate(
     [-0.5, 0.5]
     """
     mesh = as_mesh(mesh)
-    require_parcels(parcellation, mesh.n_vertices)
+    require_type(parcellation, Parcellation, "parcellation")
+    parcellation.require_vertices(mesh.n_vertices)
     labels, n_parcels = parcellation.labels, len(parcellation.names)
     (inside,) = np.nonzero(labels >= 0)
     rows = real_numbers(values, "values")
@@ -143,13 +163,3 @@ def parcellate(
     areas = sums.sum(axis=1)
     with np.errstate(invalid="ignore"):  # a parcel without vertices has the mean 0 / 0
         return (sums @ rows[inside]) / areas.reshape(-1, *[1] * (rows.ndim - 1))
-
-
-def require_parcels(parcellation: Parcellation, n_vertices: int) -> None:
-    """Raise an error if a parcellation is not of the vertices of a mesh."""
-    require_type(parcellation, Parcellation, "parcellation")
-    if len(parcellation.labels) != n_vertices:
-        raise InvalidParameterError(
-            f"A parcellation must have a label for each of {n_vertices} vertices; it has "
-            f"{len(parcellation.labels)}, so it belongs to another surface."
-        )

@@ -22,7 +22,7 @@ from eigenshape.features.region_tree import PartTree
 from eigenshape.features.segmentation import FeaturePoints, Segmentation, adjacent_parts
 from eigenshape.geometry.measure import face_areas, face_normals
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.topology import edge_table, face_pairs
+from eigenshape.geometry.topology import edge_table
 from eigenshape.spectral.spectrum import Spectrum
 
 # The constants were chosen on the tuning half of experiments/ch5_parts, where their neighbors
@@ -243,7 +243,7 @@ def _measure_borders(
     `points`, `tree` and `normals` are those of the mesh scaled to unit size.
     """
     table = edge_table(mesh)
-    pairs, edges = face_pairs(table)
+    pairs, edges = table.face_pairs
     crossing = labels[pairs[:, 0]] != labels[pairs[:, 1]]
     pairs, edges = pairs[crossing], edges[crossing]
     ends = points[table.edges[edges]]

@@ -52,8 +52,8 @@ def part_tree(mesh: MeshLike, spectrum: Spectrum, *, time: float = PART_TIME) ->
     ----------
     mesh : MeshLike
     spectrum : Spectrum
-        Spectrum of any Laplacian of the mesh. That of `part_spectrum` conducts little heat across
-        concave creases.
+        Spectrum of any Laplacian of the mesh. That of `find_parts(mesh).spectrum` conducts little
+        heat across concave creases.
     time : float
         The diffusion time t, as a share of the area.
 
@@ -78,7 +78,7 @@ def part_tree(mesh: MeshLike, spectrum: Spectrum, *, time: float = PART_TIME) ->
 
     >>> import eigenshape as es
     >>> mesh = es.geometry.disjoint_union(es.icosphere(1), es.icosphere(2))
-    >>> tree = es.features.part_tree(mesh, es.features.part_spectrum(mesh, n_modes=4))
+    >>> tree = es.features.part_tree(mesh, es.find_parts(mesh, n_modes=4).spectrum)
     >>> es.segment(tree, persistence=1).features.persistence
     array([inf, inf])
     """

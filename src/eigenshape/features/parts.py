@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
+from certeig.kit.arguments import require_type
 from certeig.kit.arrays import ReadOnly, finite_values, record, whole_number
 from certeig.kit.progress import Progress
 from certeig.kit.threads import one_blas_thread
@@ -73,6 +74,24 @@ class PartDecomposition(ReadOnly):
     tree: PartTree
     fine: Segmentation
     parts: Segmentation
+
+    def smooth(self, cut: Segmentation) -> Segmentation:
+        """Move the boundaries of another cut of the tree to short cuts along creases.
+
+        Parameters
+        ----------
+        cut : Segmentation
+            Of `tree`, by `segment`.
+
+        Returns
+        -------
+        Segmentation
+        """
+        require_type(cut, Segmentation, "cut")
+        if len(cut.features.vertices) > len(self.fine.features.vertices):
+            return smooth_boundaries(self.mesh, cut)
+        rough = segment(self.tree, persistence=FINE_CONTRAST)
+        return _join_fine_parts(rough, self.fine, cut)
 
 
 @one_blas_thread()
@@ -194,15 +213,7 @@ def find_parts(
             tree, fine = creased, segment(creased, persistence=FINE_CONTRAST)
     cut = segment(tree, persistence=contrast_at(float(fineness)))
     found = PartDecomposition(outward, spectrum, heat, tree, fine, cut)
-    return replace(found, parts=smooth_cut(found, cut))
-
-
-def smooth_cut(found: PartDecomposition, cut: Segmentation) -> Segmentation:
-    """Move the boundaries of a cut of `found.tree` to short cuts along creases."""
-    if len(cut.features.vertices) > len(found.fine.features.vertices):
-        return smooth_boundaries(found.mesh, cut)
-    rough = segment(found.tree, persistence=FINE_CONTRAST)
-    return _join_fine_parts(rough, found.fine, cut)
+    return replace(found, parts=found.smooth(cut))
 
 
 def _join_fine_parts(rough: Segmentation, fine: Segmentation, cut: Segmentation) -> Segmentation:
@@ -214,66 +225,13 @@ def _join_fine_parts(rough: Segmentation, fine: Segmentation, cut: Segmentation)
     return Segmentation(cut.labels[first_faces][fine.labels], cut.features)
 
 
-def part_spectrum(
-    mesh: MeshLike, *, n_modes: int = N_MODES, progress: Progress | None = None
-) -> Spectrum:
-    """Compute the eigenpairs of a Laplacian that conducts little heat across concave creases.
-
-    Fragments (`fragment_vertices`) are left out of the problem, and the eigenvectors are 0 there.
-
-    Parameters
-    ----------
-    mesh : MeshLike
-        With faces counter-clockwise as seen from outside, so that concave creases differ from
-        ridges.
-    n_modes : int
-        Number of eigenpairs, at least 2; one is added for each component that is not a fragment.
-    progress : callable, optional
-        Called as ``progress(fraction_done, message)`` by the eigensolver.
-
-    Returns
-    -------
-    Spectrum
-
-    Raises
-    ------
-    InvalidParameterError
-        If `n_modes` is less than 2.
-    InvalidShapeError
-        As for `find_parts`.
-
-    See Also
-    --------
-    part_tree : Merge parts by this spectrum.
-
-    Examples
-    --------
-    The first eigenfunction of a dumbbell that is not constant has one sign on each ball:
-
-    >>> import numpy as np
-    >>> import eigenshape as es
-    >>> ball = es.icosphere(3)
-    >>> x, y, z = ball.vertices.T
-    >>> thickness = 0.1 + z**2
-    >>> dumbbell = es.TriangleMesh(np.column_stack([thickness * x, thickness * y, z]), ball.faces)
-    >>> spectrum = es.features.part_spectrum(dumbbell)
-    >>> upper = z > 0.2
-    >>> len(np.unique(np.sign(spectrum.eigenvectors[upper, 1])))
-    1
-    """
-    mesh = as_mesh(mesh)
-    require_describable(mesh)
-    tensors = curvature_tensors(mesh, CONCAVITY, concave=True)
-    return _solve_parts(mesh, tensors, n_modes, progress)
-
-
 def _solve_parts(
     mesh: TriangleMesh,
     tensors: Float[np.ndarray, "f 3 3"],
     n_modes: int,
     progress: Progress | None,
 ) -> Spectrum:
-    """Return the spectrum of `part_spectrum` by the conductivity tensors of the faces."""
+    """Solve the Laplacian with these conductivity tensors; the eigenvectors are 0 on fragments."""
     fragments = fragment_vertices(mesh)
     _, labels = vertex_components(mesh)
     n_components = len(np.unique(np.delete(labels, fragments)))

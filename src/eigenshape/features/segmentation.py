@@ -9,7 +9,7 @@ from certeig.kit.errors import InvalidParameterError
 from eigenshape._arrays import face_labels
 from eigenshape.features.region_tree import MergeTree, PartTree, merge_regions
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.topology import edge_table, face_pairs
+from eigenshape.geometry.topology import edge_table
 
 Tree = MergeTree | PartTree
 
@@ -192,7 +192,7 @@ def adjacent_parts(mesh: MeshLike, labels: Int[np.ndarray, " f"]) -> Int[np.ndar
     """
     mesh = as_mesh(mesh)
     parts = face_labels(labels, "labels", mesh.n_faces)
-    faces, _ = face_pairs(edge_table(mesh))
+    faces, _ = edge_table(mesh).face_pairs
     pairs = np.sort(parts[faces], axis=1)
     return np.unique(pairs[pairs[:, 0] != pairs[:, 1]], axis=0)
 

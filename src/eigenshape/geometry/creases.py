@@ -8,7 +8,7 @@ from eigenshape._vectors import area_vectors, unit_vectors
 from eigenshape.geometry.facets import corner_fans
 from eigenshape.geometry.measure import face_normals
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.topology import edge_table, face_pairs
+from eigenshape.geometry.topology import edge_table
 
 # A crease is an edge at which the surface turns by more than this angle, in degrees ...
 LEAST_TURN = 40.0
@@ -28,7 +28,7 @@ def smooth_pairs(mesh: TriangleMesh) -> Bool[np.ndarray, " p"]:
     The faces must be turned alike. A face without area has no creases.
     """
     normals = face_normals(mesh)
-    pairs, _ = face_pairs(edge_table(mesh))
+    pairs, _ = edge_table(mesh).face_pairs
     one, two = normals[pairs].transpose(1, 0, 2)
     cosines = np.einsum("pi,pi->p", one, two)
     cosines[~(one.any(axis=1) & two.any(axis=1))] = 1.0

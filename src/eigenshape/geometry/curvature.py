@@ -5,7 +5,7 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 
 from certeig.kit.arrays import ReadOnly, record
-from eigenshape._corners import in_length, scaled_corners
+from eigenshape._corners import face_angles, in_length
 from eigenshape._errors import InvalidShapeError
 from eigenshape._vectors import scale_to_unit
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -24,14 +24,6 @@ ENOUGH_FOR_CUBIC = 13
 # Eigenvalues of the normal equations up to this share of the largest are left out; those of good
 # neighborhoods are 1e-4 of it or more.
 UNDETERMINED = 1e-9
-
-
-def face_angles(mesh: TriangleMesh) -> Float[np.ndarray, "f 3"]:
-    """Return the angle at each corner of each face, in radians."""
-    corners, _ = scaled_corners(mesh)
-    one, two = (np.roll(corners, -turn, axis=1) - corners for turn in (1, 2))
-    sines = np.linalg.norm(np.cross(one, two), axis=2)
-    return np.arctan2(sines, np.einsum("fij,fij->fi", one, two))
 
 
 def angle_defects(mesh: TriangleMesh) -> Float[np.ndarray, " n"]:

@@ -1,18 +1,16 @@
 """Betti numbers of surfaces and solids."""
 
 import numpy as np
-from jaxtyping import Int
 
+from eigenshape._corners import edges_of
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.face_turns import face_turns
 from eigenshape.geometry.facets import boundary_facets, boundary_surface, facet_table
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.simplicial import Mesh
 from eigenshape.geometry.topology import (
     is_manifold,
     require_simplices_everywhere,
-    unique_edges,
     vertex_components,
 )
 
@@ -84,9 +82,3 @@ def betti_numbers(mesh: MeshLike) -> tuple[int, ...]:
     # All but the outermost sheet of the boundary of each component surround a cavity.
     n_cavities = vertex_components(surface)[0] - n_components
     return n_components, n_components + n_cavities - characteristic, n_cavities, 0
-
-
-def edges_of(mesh: Mesh) -> Int[np.ndarray, "e 2"]:
-    """Return the edges of a mesh of any dimension, the lower point first, in lexicographic order."""
-    first, second = np.triu_indices(mesh.dim + 1, 1)
-    return unique_edges(mesh.simplices[:, first], mesh.simplices[:, second], mesh.n_points)

@@ -14,6 +14,8 @@ from eigenshape.geometry.seams import seams
 from eigenshape.geometry.simplices import MEASURES, degenerate_simplices, require_span
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.geometry.topology import (
+    non_manifold_edges,
+    non_manifold_vertices,
     repeated_simplices,
     require_simplices_everywhere,
     vertex_components,
@@ -133,3 +135,23 @@ def require_oriented(mesh: TriangleMesh) -> None:
         f"the two at edge ({edges[0, 0]}, {edges[0, 1]}) are turned against each other "
         f"({len(edges)} such). {remedy}"
     )
+
+
+def require_oriented_manifold(mesh: TriangleMesh) -> None:
+    """Raise an error if vertices have no tangent planes with a side to look at them from.
+
+    An edge has at most two faces, a vertex one fan of faces, and neighboring faces are turned
+    alike.
+    """
+    edges, vertices = non_manifold_edges(mesh), non_manifold_vertices(mesh)
+    if len(edges):
+        raise InvalidShapeError(
+            "Tangent planes need a manifold; more than two faces share edge "
+            f"({edges[0, 0]}, {edges[0, 1]}) ({len(edges)} such)."
+        )
+    if vertices.size:
+        raise InvalidShapeError(
+            f"Tangent planes need a manifold; the faces at vertex {vertices[0]} at "
+            f"{mesh.vertices[vertices[0]].tolist()} form more than one fan ({vertices.size} such)."
+        )
+    require_oriented(mesh)

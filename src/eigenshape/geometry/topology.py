@@ -48,6 +48,15 @@ class EdgeTable(ReadOnly):
     face_edges: Int[np.ndarray, "f 3"]
     n_faces: Int[np.ndarray, " e"]
 
+    @property
+    def face_pairs(self) -> tuple[Int[np.ndarray, "p 2"], Int[np.ndarray, " p"]]:
+        """Pairs (p, 2) of faces that share an edge, and the edge (p,) of each.
+
+        More than two faces at one edge give the pairs of a chain through all of them.
+        """
+        one, two = shared_facets(self.face_edges)
+        return np.column_stack([one, two]) // 3, self.face_edges.ravel()[one]
+
 
 def edge_table(mesh: MeshLike) -> EdgeTable:
     """List the edges of a triangle mesh without duplicates, and the edges of each face.
@@ -78,28 +87,10 @@ def edge_table(mesh: MeshLike) -> EdgeTable:
     return EdgeTable(table.facets, table.simplex_facets, table.n_simplices)
 
 
-def face_pairs(table: EdgeTable) -> tuple[Int[np.ndarray, "p 2"], Int[np.ndarray, " p"]]:
-    """Return the pairs of faces that share an edge, and that edge.
-
-    More than two faces at one edge give the pairs of a chain through all of them.
-    """
-    one, two = shared_facets(table.face_edges)
-    return np.column_stack([one, two]) // 3, table.face_edges.ravel()[one]
-
-
 def neighbor_links(mesh: TriangleMesh) -> sp.csr_array:
     """Return the symmetric matrix with a 1 for each two vertices that an edge connects."""
     edges = edge_table(mesh).edges
     return adjacency_matrix(edges, np.ones(len(edges)), mesh.n_vertices)
-
-
-def unique_edges(
-    one: Int[np.ndarray, "..."], two: Int[np.ndarray, "..."], n: int
-) -> Int[np.ndarray, "e 2"]:
-    """Return pairs of n points without duplicates, the lower first, in lexicographic order."""
-    # np.unique hashes integers, which takes several times as long as sorting them.
-    keys = np.sort((np.minimum(one, two) * n + np.maximum(one, two)).ravel())
-    return np.column_stack(np.divmod(keys[np.diff(keys, prepend=-1) > 0], n))
 
 
 def vertex_components(mesh: MeshLike) -> tuple[int, Int[np.ndarray, " n"]]:

@@ -3,9 +3,10 @@
 import warnings
 from pathlib import Path
 
+from certeig.kit.arguments import require_type
 from certeig.kit.errors import FileFormatError
 from certeig.kit.files import as_path, replace_file
-from eigenshape.features.parcellation import Parcellation, require_parcels
+from eigenshape.features.parcellation import Parcellation
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.io.field_files import structure_named
 from eigenshape.io.formats.registry import PARCEL_FORMATS, format_of, suffix_to_write
@@ -124,7 +125,8 @@ def write_parcellation(mesh: MeshLike, path: str | Path, parcellation: Parcellat
     9
     """
     mesh, path = as_mesh(mesh), as_path(path)
-    require_parcels(parcellation, mesh.n_vertices)
+    require_type(parcellation, Parcellation, "parcellation")
+    parcellation.require_vertices(mesh.n_vertices)
     suffix = suffix_to_write(path, PARCEL_FORMATS)
     structure = structure_named(mesh, path, ".gii")
     named = {"structure": structure} if suffix.endswith(".gii") else {}

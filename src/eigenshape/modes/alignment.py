@@ -13,7 +13,8 @@ from eigenshape.spectral.comparison.eigenspaces import (
     principal_angles,
     separated_groups,
 )
-from eigenshape.spectral.spectrum import Spectrum, require_lowest
+from eigenshape.spectral.requirements import require_lowest
+from eigenshape.spectral.spectrum import Spectrum
 
 # Angle between a direction of a group and the reference, beyond which the direction is as much of
 # other modes as of its own group: half a right angle.

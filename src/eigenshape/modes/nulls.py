@@ -13,7 +13,8 @@ from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike, Integer
 from eigenshape._arrays import point_functions
 from eigenshape.modes.fits import size_one_maps
-from eigenshape.spectral.spectrum import Spectrum, count_zero_modes, require_lowest
+from eigenshape.spectral.requirements import require_lowest
+from eigenshape.spectral.spectrum import Spectrum
 from eigenshape.spectral.tools.filters import project
 
 Residual = Literal["none", "add", "permute"]
@@ -96,7 +97,7 @@ def rotation_nulls(
         raise InvalidParameterError(
             f"Rotations need at least 4 modes; there are {len(spectrum.eigenvalues)}."
         )
-    n_constant = count_zero_modes(spectrum)
+    n_constant = spectrum.n_zero_modes
     if n_constant != 1:
         raise InvalidParameterError(
             f"Rotations need one constant mode, that of a connected shape; there are {n_constant}. "

@@ -10,7 +10,8 @@ from scipy.sparse.csgraph import connected_components
 from certeig.kit.arguments import require_type
 from certeig.kit.arrays import ReadOnly, record, whole_number
 from certeig.kit.typing import Integer
-from eigenshape.operators.laplacian import Laplacian, require_matrix
+from eigenshape.operators.laplacian import Laplacian
+from eigenshape.operators.requirements import require_matrix
 from eigenshape.spectral.solve import solve_spectrum
 
 

@@ -8,7 +8,8 @@ from certeig.kit.arguments import require_type, require_unicode
 from certeig.kit.arrays import real_numbers
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike
-from eigenshape.calculus.voxels import as_affine, different_values, voxel_surface
+from eigenshape._arrays import as_affine, different_values
+from eigenshape.calculus.voxels import voxel_surface
 from eigenshape.geometry.mesh import TriangleMesh
 
 # The structures of BrainPrint and their labels in aseg.mgz of FreeSurfer (FreeSurferColorLUT.txt).

@@ -108,9 +108,3 @@ def interpolation_constants(mesh: Mesh) -> Float[np.ndarray, " s"]:
         stretch = np.linalg.norm(maps, 2, axis=(1, 2))
         bounds = np.minimum(bounds, REGULAR_TETRAHEDRON * stretch)
     return in_length(bounds, scale, 1)
-
-
-def longest_edges(mesh: Mesh) -> Float[np.ndarray, " s"]:
-    """Return the length of the longest edge of each simplex."""
-    corners, scale = scaled_corners(mesh)
-    return in_length(side_lengths(corners).max(axis=1), scale, 1)

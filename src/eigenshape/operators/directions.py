@@ -5,12 +5,10 @@ from jaxtyping import Float, Int
 
 from certeig.kit.arrays import ReadOnly, record
 from eigenshape._corners import edge_keys, scaled_corners, shared_facets, side_ends
-from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.requirements import require_oriented, require_sound
-from eigenshape.geometry.topology import (
-    non_manifold_edges,
-    non_manifold_vertices,
+from eigenshape.geometry.requirements import (
+    require_oriented_manifold,
+    require_sound,
 )
 
 
@@ -92,23 +90,3 @@ def side_twins(mesh: TriangleMesh) -> Int[np.ndarray, " h"]:
     twins = np.full(len(keys), -1)
     twins[one], twins[two] = two, one
     return twins
-
-
-def require_oriented_manifold(mesh: TriangleMesh) -> None:
-    """Raise an error if vertices have no tangent planes with a side to look at them from.
-
-    An edge has at most two faces, a vertex one fan of faces, and neighboring faces are turned
-    alike.
-    """
-    edges, vertices = non_manifold_edges(mesh), non_manifold_vertices(mesh)
-    if len(edges):
-        raise InvalidShapeError(
-            "Tangent planes need a manifold; more than two faces share edge "
-            f"({edges[0, 0]}, {edges[0, 1]}) ({len(edges)} such)."
-        )
-    if vertices.size:
-        raise InvalidShapeError(
-            f"Tangent planes need a manifold; the faces at vertex {vertices[0]} at "
-            f"{mesh.vertices[vertices[0]].tolist()} form more than one fan ({vertices.size} such)."
-        )
-    require_oriented(mesh)

@@ -9,11 +9,10 @@ from certeig.kit.arguments import require_choice
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.matrices import require_square
 from eigenshape._arrays import adjacency_matrix
-from eigenshape._corners import in_length
+from eigenshape._corners import edges_of, in_length
 from eigenshape._errors import InvalidShapeError, try_auto
 from eigenshape._vectors import size_one
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
-from eigenshape.geometry.homology import edges_of
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.operators.laplacian import Laplacian
 

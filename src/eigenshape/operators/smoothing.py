@@ -6,7 +6,7 @@ from jaxtyping import Float, Int
 from certeig.kit.arrays import positive_number
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.threads import one_blas_thread
-from certeig.sparse.symmetric_factor import factor_matrix
+from certeig.sparse.symmetric_factor import SymmetricFactor
 from eigenshape._corners import mean_normals
 from eigenshape._errors import InvalidShapeError
 from eigenshape._vectors import size_one
@@ -140,7 +140,7 @@ def _flow(
     pencil = (laplacian.mass + time * laplacian.stiffness).tocsr()[free]
     mass = laplacian.mass.diagonal()[free, None]
     fixed = np.setdiff1d(np.arange(len(points)), free)
-    factor = factor_matrix(pencil[:, free])
+    factor = SymmetricFactor.of(pencil[:, free])
     if factor is None:
         raise InvalidShapeError(
             "All triangles must have angles well above 0 for the surface to be smoothed; some have angles so close to "

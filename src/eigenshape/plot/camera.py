@@ -15,7 +15,7 @@ from certeig.kit.typing import ArrayLike
 from eigenshape._vectors import area_vectors, scale_to_unit, triangle_areas
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.topology import edge_table, face_pairs
+from eigenshape.geometry.topology import edge_table
 
 Up = TypeAliasType("Up", Literal["auto", "x", "y", "z", "-x", "-y", "-z"] | ArrayLike)
 View = TypeAliasType(
@@ -258,7 +258,7 @@ def _guess_front(
     if np.einsum("ij,ij->", vectors, points[mesh.faces].mean(axis=1)) < 0:
         normals = -normals  # the faces look inward
     table = edge_table(mesh)
-    pairs, edges = face_pairs(table)
+    pairs, edges = table.face_pairs
     one, two = normals[pairs].transpose(1, 0, 2)
     angles = np.arccos(np.clip(np.einsum("ij,ij->i", one, two), -1, 1))
     begin, end = points[table.edges[edges]].transpose(1, 0, 2)

@@ -11,7 +11,7 @@ from matplotlib.cm import ScalarMappable
 from certeig.kit.arguments import require_type
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike
-from eigenshape.features.parcellation import Parcellation, require_parcels
+from eigenshape.features.parcellation import Parcellation
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.hemispheres import hemisphere_of
@@ -151,7 +151,8 @@ def figure_cortex(
 
 def _parcel_colors(parcellation: Parcellation, mesh: TriangleMesh) -> Float[np.ndarray, "f 3"]:
     """Return the color of the parcel that most corners of a face belong to."""
-    require_parcels(parcellation, mesh.n_vertices)
+    require_type(parcellation, Parcellation, "parcellation")
+    parcellation.require_vertices(mesh.n_vertices)
     first, second, third = parcellation.labels[mesh.faces].T
     gray = [[float(NO_VALUE)] * 3]  # which the label -1 finds
     colors = np.concatenate([parcellation.colors[:, :3], gray])

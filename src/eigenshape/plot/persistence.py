@@ -7,7 +7,8 @@ from matplotlib.colors import to_hex
 from certeig.kit.arguments import require_type
 from certeig.kit.arrays import number_from_zero, whole_number
 from eigenshape.features.diagram import PersistenceDiagram, PersistencePairs
-from eigenshape.features.segmentation import Tree, merge_targets
+from eigenshape.features.region_tree import MergeTree, PartTree
+from eigenshape.features.segmentation import merge_targets
 from eigenshape.plot.figure import Figure
 from eigenshape.plot.render import palette
 
@@ -74,7 +75,11 @@ def figure_diagram(diagram: PersistenceDiagram, *, label: str = "function") -> F
 
 
 def figure_merge_tree(
-    tree: Tree, *, persistence: float | None = None, n_maxima: int = 40, label: str = "function"
+    tree: MergeTree | PartTree,
+    *,
+    persistence: float | None = None,
+    n_maxima: int = 40,
+    label: str = "function",
 ) -> Figure:
     """Draw which region merges into which, and at which persistence.
 
@@ -109,7 +114,7 @@ def figure_merge_tree(
     >>> figure.axes[0].get_title()
     'cut at 0.5: 2 regions left'
     """
-    require_type(tree, Tree, "tree")
+    require_type(tree, MergeTree | PartTree, "tree")
     shown = min(whole_number(n_maxima, "n_maxima", 1), len(tree.maxima))
     into = merge_targets(tree)[:shown]
     finite = tree.persistence[np.isfinite(tree.persistence)]

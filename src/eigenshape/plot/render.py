@@ -12,7 +12,7 @@ from eigenshape.geometry.creases import corner_normals
 from eigenshape.geometry.face_turns import orient_consistently
 from eigenshape.geometry.topology import boundary_edges
 from eigenshape.plot.camera import Camera, in_picture
-from eigenshape.scans.raster import Raster, rasterize
+from eigenshape.scans.raster import Raster
 
 FINER = 2  # pixels drawn for each shown, along each side
 LIGHT = np.array([-0.35, -0.55, 0.76])  # from the upper left, towards the viewer
@@ -100,7 +100,7 @@ def draw(
     require_type(camera, Camera, "camera")
     fine = Camera(camera.rotation, camera.size * FINER)
     points = in_picture(mesh, fine)
-    raster = rasterize(points, mesh.faces, fine.size, fine.size)
+    raster = Raster.of(points, mesh.faces, fine.size, fine.size)
     seen = raster.face >= 0
 
     def blend(at_corners: Float[np.ndarray, "f 3 c"]) -> Float[np.ndarray, "h w c"]:

@@ -3,24 +3,21 @@
 from collections.abc import Mapping
 
 import numpy as np
-from jaxtyping import Bool, Float
 from matplotlib.ticker import MaxNLocator
 
 from certeig.kit.arguments import require_type
-from certeig.kit.arrays import finite_values, positive_number, record
+from certeig.kit.arrays import positive_number
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike
 from eigenshape.plot.figure import Figure
 from eigenshape.plot.render import palette
 from eigenshape.spectral.bounds.brackets import Brackets
 from eigenshape.spectral.comparison.eigenvalues import (
+    KnownEigenvalues,
     SpectrumComparison,
-    count_as_zero,
-    relative_change,
-    within_brackets,
-    within_residuals,
+    known_eigenvalues,
 )
-from eigenshape.spectral.spectrum import Spectrum, require_lowest
+from eigenshape.spectral.spectrum import Spectrum
 
 # Relative differences that span more powers of ten than this are drawn on a logarithmic axis.
 DECADES = 1.5
@@ -91,15 +88,7 @@ def figure_spectrum(
     return figure
 
 
-@record
-class _Row:
-    """One spectrum to be drawn, with the intervals of its eigenvalues where they are known."""
-
-    title: str
-    values: Float[np.ndarray, " k"]
-    zero: Bool[np.ndarray, " k"]
-    intervals: Float[np.ndarray, "k 2"] | None = None
-    bracketed: bool = False
+Row = tuple[str, KnownEigenvalues]  # with its title
 
 
 def figure_spectra(
@@ -162,27 +151,24 @@ def draw_comparison(
     _draw_rows(panels, _rows(compared, titles, {}), "1/length²")
 
 
-def _draw_rows(panels: np.ndarray, rows: list[_Row], unit: str) -> None:
+def _draw_rows(panels: np.ndarray, rows: list[Row], unit: str) -> None:
     """Draw eigenvalues by number, and below them relative differences from the first row."""
     above, below = panels
     colors = palette(np.arange(len(rows)))
-    for row, color in zip(rows, colors, strict=True):
-        number = np.arange(len(row.values))
-        if row.intervals is not None:
-            width, label = (3, f"{row.title}: bracket") if row.bracketed else (1, "_")
-            bars = above.vlines(number, *row.intervals.T, color=color, lw=width, label=label)
+    for (title, known), color in zip(rows, colors, strict=True):
+        number = np.arange(len(known.values))
+        if len(known.intervals):
+            width, label = (3, f"{title}: bracket") if known.bracketed else (1, "_")
+            bars = above.vlines(number, *known.intervals.T, color=color, lw=width, label=label)
             bars.set_alpha(0.35)
-        above.plot(number, row.values, ".-", color=color, markersize=3.5, lw=0.8, label=row.title)
+        above.plot(number, known.values, ".-", color=color, markersize=3.5, lw=0.8, label=title)
     above.set_ylabel(f"eigenvalue λ, {unit}")
     above.legend(frameon=False, loc="upper left", fontsize=9)
 
+    first_title, first = rows[0]
     changes = []
-    for other in rows[1:]:
-        k = min(len(rows[0].values), len(other.values))
-        values, zero = zip(
-            *((row.values[:k], row.zero[:k]) for row in (rows[0], other)), strict=True
-        )
-        change = relative_change(*values, zero=zero)
+    for _, other in rows[1:]:
+        change = first.change_to(other)
         changes.append(np.where(np.isfinite(change), change, np.nan))
     # On a logarithmic axis where they span decades
     seen = np.concatenate([change[change > FAINT] for change in changes])
@@ -194,7 +180,7 @@ def _draw_rows(panels: np.ndarray, rows: list[_Row], unit: str) -> None:
         below.set_yscale("log")
     else:
         below.set_ylim(bottom=0)
-    below.set_ylabel(f"relative difference\nfrom {rows[0].title}")
+    below.set_ylabel(f"relative difference\nfrom {first_title}")
     below.set_xlabel("number i")
     for axes in (above, below):
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
@@ -205,11 +191,11 @@ def _rows(
     spectra: SpectrumComparison | Mapping[str, Spectrum | ArrayLike],
     titles: tuple[str, str],
     brackets: Mapping[str, Brackets],
-) -> list[_Row]:
+) -> list[Row]:
     if isinstance(spectra, SpectrumComparison):
         parts = (spectra.one, spectra.intervals_one), (spectra.two, spectra.intervals_two)
         return [
-            _Row(title, values, intervals[:, 0] <= 0, intervals, spectra.bracketed)
+            (title, KnownEigenvalues(values, intervals[:, 0] <= 0, intervals, spectra.bracketed))
             for title, (values, intervals) in zip(titles, parts, strict=True)
         ]
     unknown = [title for title in brackets if title not in spectra]
@@ -217,18 +203,7 @@ def _rows(
         raise InvalidParameterError(
             f"The titles of brackets must be titles of spectra, {list(spectra)}; one is {unknown[0]!r}."
         )
-    rows = []
-    for title, spectrum in spectra.items():
-        intervals: Float[np.ndarray, "k 2"] | None = None
-        if isinstance(spectrum, Spectrum):
-            require_lowest(spectrum, title)
-            values = spectrum.eigenvalues
-            intervals = within_residuals(spectrum, len(values))
-            zero = intervals[:, 0] <= 0
-        else:
-            values = finite_values(spectrum, title)
-            zero = count_as_zero(values)
-        if title in brackets:
-            intervals = within_brackets(brackets[title], len(values), title)
-        rows.append(_Row(title, values, zero, intervals, title in brackets))
-    return rows
+    return [
+        (title, known_eigenvalues(spectrum, title, brackets.get(title)))
+        for title, spectrum in spectra.items()
+    ]

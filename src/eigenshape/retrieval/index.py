@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from shutil import rmtree
+from time import time
 from typing import Any
 
 from certeig.kit.arguments import require_each, require_type
@@ -40,6 +41,7 @@ from eigenshape.retrieval.thumbnails import draw_thumbnail
 
 IN_MEMORY = Path("/dev/shm")  # where Linux keeps files in memory
 
+STAGE = "stage.txt"  # in the folder of an index, while it is prepared for its first shapes
 MOST_LISTED = 10  # shapes that a notebook shows of an index
 
 
@@ -159,6 +161,16 @@ class ShapeIndex:
         """
         create(Path(folder), exist_ok=True)
         return cls.open(folder)
+
+    @property
+    def stage(self) -> str | None:
+        """What is being done to an index before it holds shapes, and how old that note is; otherwise None."""
+        note = self.folder / STAGE
+        try:
+            age = max(time() - note.stat().st_mtime, 0)
+            return f"{note.read_text()}, {age:.0f} s ago"
+        except OSError:
+            return None
 
     def __len__(self) -> int:
         return len(read_state(self.folder))
@@ -427,6 +439,34 @@ class ShapeIndex:
             writer = Writer(self.folder, database)
             for name in names:
                 writer.remove(name)
+
+    def prune(self, *folders: str | Path) -> list[str]:
+        """Remove the shapes whose files lay in some folders and are no longer there, all in one step.
+
+        Parameters
+        ----------
+        *folders : str or Path
+            Those that were indexed.
+
+        Returns
+        -------
+        list of str
+            The names of the removed shapes.
+
+        Raises
+        ------
+        StoreError
+            As for `remove`.
+        """
+        places = [as_path(folder, "folders").absolute() for folder in folders]
+        gone = []
+        for record in self.records():
+            path = Path(record.source) if record.source else None
+            if path and any(path.is_relative_to(place) for place in places) and not path.exists():
+                gone.append(record.name)
+        if gone:
+            self.remove(*gone)  # in one step: each change of an index waits for the disk
+        return gone
 
     def query(
         self,

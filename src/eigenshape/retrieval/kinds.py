@@ -26,13 +26,8 @@ from eigenshape.retrieval.heat.score import HeatDescriptor, match_features, matc
 from eigenshape.retrieval.patches.codebook import read_codebook, write_codebook
 from eigenshape.retrieval.patches.descriptor import PatchDescriptor, PatchRecipe, patch_descriptor
 from eigenshape.retrieval.patches.distance import packed_distances, scale_distances
-from eigenshape.retrieval.patches.matching import match_patches
-from eigenshape.retrieval.patches.packing import (
-    pack_codes,
-    pack_points,
-    unpack_codes,
-    unpack_points,
-)
+from eigenshape.retrieval.patches.matching import match_patches, pack_points, unpack_points
+from eigenshape.retrieval.patches.packing import pack_codes, unpack_codes
 from eigenshape.retrieval.patches.patches import N_VIEWS as N_PATCH_VIEWS
 from eigenshape.retrieval.patches.patches import mesh_patches
 from eigenshape.retrieval.patches.verification import verified_scores

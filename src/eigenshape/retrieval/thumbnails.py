@@ -8,7 +8,7 @@ from jaxtyping import Float, UInt8
 
 from certeig.kit.threads import one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.scans.raster import rasterize
+from eigenshape.scans.raster import Raster
 
 SIZE = 128  # pixels of each side
 FINER = 2  # pixels drawn for each shown, along each side
@@ -61,7 +61,7 @@ def draw_thumbnail(mesh: MeshLike) -> bytes:
     scale = size * (1 - 2 * MARGIN) / extent
     points *= scale
     points[:, :2] += size / 2 - middle * scale
-    raster = rasterize(points, mesh.faces, size, size)
+    raster = Raster.of(points, mesh.faces, size, size)
     corners = points[mesh.faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     lengths = np.linalg.norm(normals, axis=1)

@@ -19,7 +19,7 @@ from eigenshape.geometry.repairs.repair_steps import faces_of_largest
 from eigenshape.geometry.topology import submesh
 from eigenshape.scans.frames import pixel_faces
 from eigenshape.scans.partial import rotation_towards, unit_direction
-from eigenshape.scans.raster import rasterize
+from eigenshape.scans.raster import Raster
 
 # The noise grows with the slant θ by this number times (θ / (π/2 - θ))², relative to the noise at θ
 # = 0 (Nguyen, Izadi and Lovell 2012, equation 3, at 1.5 m).
@@ -192,7 +192,7 @@ def simulate_scan(
     focal = (size / 2 - 1) * float(np.sqrt(4 * camera.distance**2 - 1))
     depths = -placed.vertices[:, 2]
     in_picture = focal * placed.vertices[:, :2] / depths[:, None] + size / 2
-    raster = rasterize(np.column_stack([in_picture, 1 / depths]), placed.faces, size, size)
+    raster = Raster.of(np.column_stack([in_picture, 1 / depths]), placed.faces, size, size)
     is_seen = raster.face >= 0
     depth = np.where(is_seen, 1 / raster.depth, np.inf)
     # The vector from the camera to each pixel in the plane at distance 1.

@@ -17,7 +17,7 @@ from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair_steps import faces_of_largest
 from eigenshape.geometry.topology import is_closed, submesh
-from eigenshape.scans.raster import rasterize
+from eigenshape.scans.raster import Raster
 
 # A vertex may be this many pixels away from the middle of the pixel in which the surface was seen,
 # so it may lie deeper than that surface by SLACK times (1 + slope).
@@ -134,7 +134,7 @@ def visible_part(
             "all its vertices lie on one line of sight. Choose another view."
         )
     pixels = (points - low) * ((resolution - 2) / span) + 1
-    raster = rasterize(pixels, mesh.faces, resolution, resolution)
+    raster = Raster.of(pixels, mesh.faces, resolution, resolution)
     column, row = pixels[:, :2].astype(np.int64).T
     # The slope is the same on both sides of the surface, so it does not matter which is outside.
     towards = np.abs(mean_normals(orient_consistently(mesh)) @ direction)

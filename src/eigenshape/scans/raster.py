@@ -31,31 +31,35 @@ class Raster:
     weights: Float[np.ndarray, "h w 3"]
     depth: Float[np.ndarray, "h w"]
 
+    @classmethod
+    def of(
+        cls,
+        points: Float[np.ndarray, "n 3"],
+        faces: Int[np.ndarray, "f 3"],
+        width: int,
+        height: int,
+    ) -> "Raster":
+        """Find the nearest face at the middle of each pixel.
 
-def rasterize(
-    points: Float[np.ndarray, "n 3"], faces: Int[np.ndarray, "f 3"], width: int, height: int
-) -> Raster:
-    """Find the nearest face at the middle of each pixel.
+        Parameters
+        ----------
+        points : (n, 3) float
+            Columns: pixels to the right, pixels down, and height towards the viewer. The middle of the
+            first pixel is at (0.5, 0.5).
+        faces : (f, 3) int
+            Corners of each face.
+        width, height : int
+            Size of the picture, in pixels.
 
-    Parameters
-    ----------
-    points : (n, 3) float
-        Columns: pixels to the right, pixels down, and height towards the viewer. The middle of the
-        first pixel is at (0.5, 0.5).
-    faces : (f, 3) int
-        Corners of each face.
-    width, height : int
-        Size of the picture, in pixels.
-
-    Returns
-    -------
-    Raster
-        Of two faces at the same height the one with the lower index is visible.
-    """
-    depth = np.full((height, width), -np.inf)
-    face = np.full((height, width), -1, dtype=np.int64)
-    weights = np.zeros((height, width, 3))
-    corners = np.ascontiguousarray(faces, dtype=np.int64)
-    places = np.ascontiguousarray(points, dtype=np.float64)
-    fill_buffer(places, corners, LEAST_DOUBLED_AREA, EDGE_SLACK, face, weights, depth)
-    return Raster(face, weights, depth)
+        Returns
+        -------
+        Raster
+            Of two faces at the same height the one with the lower index is visible.
+        """
+        depth = np.full((height, width), -np.inf)
+        face = np.full((height, width), -1, dtype=np.int64)
+        weights = np.zeros((height, width, 3))
+        corners = np.ascontiguousarray(faces, dtype=np.int64)
+        places = np.ascontiguousarray(points, dtype=np.float64)
+        fill_buffer(places, corners, LEAST_DOUBLED_AREA, EDGE_SLACK, face, weights, depth)
+        return cls(face, weights, depth)

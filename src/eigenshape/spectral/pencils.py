@@ -1,7 +1,6 @@
 """The pencil of a Laplacian, with what messages of the solver say about shapes."""
 
 from certeig.advice import Advice
-from certeig.solver import pencil
 from certeig.solver.pencil import Pencil
 from eigenshape.operators.laplacian import Laplacian
 
@@ -36,7 +35,7 @@ def normalize(laplacian: Laplacian) -> Pencil:
     far apart for floats.
     """
     kernel = laplacian.kernel
-    return pencil.normalize(
+    return Pencil.scaled(
         laplacian.stiffness,
         laplacian.mass,
         known_floor=laplacian.mass_floor,

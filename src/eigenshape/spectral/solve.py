@@ -17,9 +17,8 @@ from certeig.kit.progress import Progress, silent
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike, Integer
 from certeig.solver.certified import certified_pairs
-from certeig.solver.certify import in_user_units
 from certeig.solver.eigenpairs import Pairs
-from certeig.solver.pencil import Pencil, to_user_vectors
+from certeig.solver.pencil import Pencil
 from eigenshape.operators.laplacian import Laplacian, dirichlet_laplacian
 from eigenshape.spectral.cache import content_key, keep, load_kept
 from eigenshape.spectral.kernel_values import (
@@ -265,10 +264,12 @@ def spectrum_of(
     require_readable(kernel, values, stacklevel=4)
     return Spectrum(
         eigenvalues=freeze(from_pencil(kernel, values)),
-        eigenvectors=to_user_vectors(pencil, pairs.vectors),
+        eigenvectors=pencil.to_user_vectors(pairs.vectors),
         mass=laplacian.mass,
         residuals=freeze(user_residuals(kernel, values, residuals)),
-        certificate=user_certificate(kernel, in_user_units(pencil, certificate), float(values[-1])),
+        certificate=user_certificate(
+            kernel, pencil.certificate_out(certificate), float(values[-1])
+        ),
     )
 
 

@@ -1,13 +1,10 @@
-"""A spectrum of a shape, and how fast its modes lose heat."""
+"""A spectrum of a shape."""
 
 import numpy as np
 from jaxtyping import Float
 
 import certeig
-from certeig.kit.arguments import require_type
-from certeig.kit.arrays import positive_values, record
-from certeig.kit.errors import InvalidParameterError
-from certeig.kit.typing import ArrayLike
+from certeig.kit.arrays import record
 from certeig.spectrum import ZERO_RESIDUALS
 from eigenshape.spectral.certificate import Certificate
 
@@ -64,43 +61,17 @@ class Spectrum(certeig.Spectrum):
     maker = "eigenshape"
     least = 0.0
 
+    @property
+    def point_areas(self) -> Float[np.ndarray, " n"]:
+        """Area around each point, (n,) in length^m: the row sums of B."""
+        return self.mass.sum(axis=1)
 
-def count_zero_modes(spectrum: Spectrum) -> int:
-    """Return how many of the first eigenvalues count as 0: one for each component of a shape."""
-    values = spectrum.eigenvalues
-    rounding = ZERO_RESIDUALS * spectrum.residuals
-    if spectrum.certificate.count is None:
-        rounding = np.minimum(rounding, APPROXIMATE_NULL * values[-1])
-    zero = values <= np.maximum(NULL * values[-1], rounding)
-    return len(values) if zero.all() else int(np.argmin(zero))
-
-
-def require_lowest(spectrum: Spectrum, name: str) -> None:
-    """Raise an error for what is no spectrum, or does not begin with the lowest eigenvalue."""
-    require_type(spectrum, Spectrum, name)
-    if spectrum.certificate.first:
-        raise InvalidParameterError(
-            f"{name} must begin with the lowest eigenvalue; it begins with number "
-            f"{spectrum.certificate.first}. Use solve_spectrum without above."
-        )
-
-
-def exponential_decay(
-    eigenvalues: Float[np.ndarray, " k"], times: ArrayLike
-) -> Float[np.ndarray, "k q"]:
-    """Return exp(-t λ_i) for each eigenvalue and each time, without any check."""
-    return np.exp(-np.outer(eigenvalues, np.asarray(times)))
-
-
-def decay_factors(
-    spectrum: Spectrum, times: ArrayLike, name: str = "times"
-) -> Float[np.ndarray, "k q"]:
-    """Return exp(-t λ_i), the share of eigenfunction i that is left after each time t.
-
-    `name` is what messages call the times.
-
-    Raises an InvalidParameterError if a time is not positive and finite, or the spectrum does not
-    begin with the lowest eigenvalue.
-    """
-    require_lowest(spectrum, "spectrum")
-    return exponential_decay(spectrum.eigenvalues, positive_values(times, name))
+    @property
+    def n_zero_modes(self) -> int:
+        """Number of the first eigenvalues that count as 0: one for each component of a shape."""
+        values = self.eigenvalues
+        rounding = ZERO_RESIDUALS * self.residuals
+        if self.certificate.count is None:
+            rounding = np.minimum(rounding, APPROXIMATE_NULL * values[-1])
+        zero = values <= np.maximum(NULL * values[-1], rounding)
+        return len(values) if zero.all() else int(np.argmin(zero))

@@ -9,11 +9,11 @@ from scipy.spatial import cKDTree
 from certeig.kit.arguments import require_type
 from certeig.kit.arrays import ReadOnly, positive_values, record, whole_number
 from certeig.kit.errors import InvalidParameterError
+from eigenshape._corners import longest_edges
 from eigenshape._vectors import size_one
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.distances.geodesic import unchecked_waves
 from eigenshape.geometry.samples.surface_points import SurfacePoints, place_points
-from eigenshape.operators.crouzeix_raviart import longest_edges
 from eigenshape.stability.perturbation import OUTSIDE, Perturbation
 
 # Relative margin for the rounding of a distance; a larger one tests a few more nodes exactly.

@@ -12,8 +12,9 @@ from certeig.kit.errors import ConvergenceError, InvalidParameterError
 from certeig.kit.text import html_repr
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike
-from eigenshape.operators.clouds.kernel import EDGE_FACTOR, LAST
-from eigenshape.operators.laplacian import Laplacian, require_matrix
+from eigenshape.operators.clouds.kernel import time_range
+from eigenshape.operators.laplacian import Laplacian
+from eigenshape.operators.requirements import require_matrix
 
 # Points up to which the norm comes from a dense eigensolver: Lanczos' method needs more points than
 # vectors.
@@ -245,7 +246,5 @@ def admissible_times(
     positive_values([spacing, eigenvalue], "spacing and eigenvalue")
     if delta:
         positive_values(delta, "delta")
-    radius = EDGE_FACTOR * spacing / 2
-    reach = radius * radius  # infinite if it overflows, where a power raises an error
-    high = (LAST if corrected else 0.5) / eigenvalue
+    reach, high = time_range(spacing, eigenvalue, corrected=corrected)
     return TimeRange(max(delta * delta, reach), high, reach)

@@ -10,14 +10,9 @@ from certeig.kit.arrays import record
 from certeig.kit.progress import Progress
 from certeig.kit.text import html_repr
 from eigenshape.geometry.cloud import PointCloud, Shape
-from eigenshape.geometry.samples.quadrature import Quadrature
-from eigenshape.geometry.samples.spacing import neighbor_distance
 from eigenshape.geometry.samples.surface_points import sample_surface
 from eigenshape.operators.clouds.kernel import (
-    KernelOptions,
-    choose_kernel,
-    kernel_laplacian,
-    require_whole,
+    sample_laplacian,
 )
 from eigenshape.operators.clouds.neighbors import neighbor_graph
 from eigenshape.spectral.comparison.angles import EigenspaceAngles, eigenspace_angles
@@ -138,9 +133,7 @@ def changes_over_times(
         progress(place / len(times), f"heat time {t:.3g}")
         laplacians = []
         for points, labels in zip(clouds, pieces, strict=True):
-            kernel = choose_kernel(KernelOptions(t=t), neighbor_distance(points, dim))
-            laplacian = kernel_laplacian(Quadrature(points, None, dim), kernel)
-            require_whole(laplacian, labels, kernel)
+            laplacian = sample_laplacian(points, dim, t, labels)
             # Without its kernel the solver does not warn about heat times out of range:
             # `ChangeAtTime.admissible` reports them. (A filter of warnings would act on other
             # threads too.)

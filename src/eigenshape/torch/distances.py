@@ -11,7 +11,8 @@ import torch
 from torch import Tensor
 
 from certeig.kit.arrays import positive_number
-from eigenshape.calculus.heat_distance import require_heat, require_sources
+from eigenshape._arrays import require_sources
+from eigenshape.calculus.heat_distance import require_heat
 from eigenshape.calculus.linear_solver import factorize_definite, factorize_grounded
 from eigenshape.torch.operators import (
     as_faces,

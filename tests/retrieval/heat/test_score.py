@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from certeig.kit.errors import InvalidParameterError
 from eigenshape.retrieval.heat import score
-from eigenshape.retrieval.heat.recipe import PRESETS, SCALE_FREE, THESIS, HeatRecipe
+from eigenshape.retrieval.heat.recipe import SCALE_FREE, THESIS, HeatRecipe
 from eigenshape.retrieval.heat.score import (
     HeatDescriptor,
     match_features,
@@ -97,8 +97,7 @@ def test_recipes_must_agree():
         HeatRecipe(logarithmic=False)
 
 
-def test_presets_say_what_the_thesis_says():
-    assert set(PRESETS) == {"scale-free", "thesis"}
+def test_the_recipe_of_the_thesis_is_what_the_thesis_says():
     assert THESIS.scales == (5, 20, 40, 60, 100, 150, 200, 300, 400, 500, 600, 700, 800, 900, 1000)
     assert (THESIS.time_unit, THESIS.feature_scale, THESIS.n_features, THESIS.unit) == (
         2e-4,

@@ -13,10 +13,11 @@ from eigenshape.retrieval.patches.matching import (
     distances_by_landmarks,
     nearest_lengths,
     nearest_of_each_other,
+    pack_points,
     patch_points,
+    unpack_points,
 )
 from eigenshape.retrieval.patches.matching_loops import leading
-from eigenshape.retrieval.patches.packing import pack_points, unpack_points
 from eigenshape.retrieval.patches.patches import surface_patches
 
 HAND = es.make_creature("hand", 1, n_vertices=1500)

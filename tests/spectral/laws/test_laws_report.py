@@ -290,7 +290,7 @@ def test_a_boundary_condition_is_definite_and_a_free_boundary_is_not():
 
 
 def test_where_no_factor_serves_nothing_is_taken_for_proved(monkeypatch):
-    monkeypatch.setattr(laplacian_laws, "factorize", lambda *_: None)
+    monkeypatch.setattr(laplacian_laws.Factor, "at", lambda *_: None)
     report = check_laplacian(cotangent_laplacian(SPHERE), promises=["constants", "definite"])
     assert broken(report) == {"positive semidefinite", "kernel", "definite"}
     assert (

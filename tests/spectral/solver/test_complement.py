@@ -8,7 +8,7 @@ from certeig.kit.errors import ConvergenceError
 from certeig.solver import strategy
 from certeig.solver.complement import prove_outside, sparser_below
 from certeig.solver.eigenpairs import Pairs
-from certeig.solver.factor import factorize
+from certeig.solver.factor import Factor
 from certeig.solver.pencil import rayleigh_residuals
 from eigenshape.operators.clouds.gaussian import mesh_laplacian
 from eigenshape.shapes.surfaces import icosphere, torus
@@ -28,7 +28,7 @@ def pairs_of(columns):
 
 
 def factor_above(k):
-    return factorize(sparser_below(PENCIL), 1.001 * float(VALUES[k - 1]))
+    return Factor.at(sparser_below(PENCIL), 1.001 * float(VALUES[k - 1]))
 
 
 def test_the_sparser_operator_is_below():

@@ -7,8 +7,7 @@ from pencils import dense_eigenvalues, graph, path, wild
 
 from certeig.kit.errors import ConvergenceError, InvalidParameterError
 from certeig.solver import shift as shift_module
-from certeig.solver.factor import factorize, rounding
-from certeig.solver.pencil import residual_norms
+from certeig.solver.factor import Factor
 from certeig.solver.shift import factorize_near, shift_inside
 from certeig.sparse.front_loops import WIDE
 from eigenshape.operators.cotangent import cotangent_laplacian
@@ -26,7 +25,7 @@ def scaled_back(pencil, value):
 def test_pivots_count_the_eigenvalues_below_the_shift():
     pencil = normalize(graph(path(3)))  # eigenvalues 0, 1, 3
     counts = [
-        factorize(pencil, scaled_back(pencil, shift)).count for shift in (-0.5, 0.5, 1.5, 2.9, 3.1)
+        Factor.at(pencil, scaled_back(pencil, shift)).count for shift in (-0.5, 0.5, 1.5, 2.9, 3.1)
     ]
     assert counts == [0, 1, 2, 2, 3]
 
@@ -36,16 +35,16 @@ def test_counts_agree_with_a_dense_solve(mass):
     laplacian = cotangent_laplacian(icosphere(2), mass)
     pencil, reference = normalize(laplacian), dense_eigenvalues(laplacian)
     for shift in np.linspace(0.7, 0.99 * reference[-1], 23):
-        assert factorize(pencil, scaled_back(pencil, shift)).count == np.count_nonzero(
+        assert Factor.at(pencil, scaled_back(pencil, shift)).count == np.count_nonzero(
             reference < shift
         )
 
 
 def test_a_zero_pivot_is_no_factor():
     pencil = normalize(graph(path(2)))  # at σ = 1 the diagonal is zero and pivots would leave it
-    assert factorize(pencil, scaled_back(pencil, 1.0)) is None
+    assert Factor.at(pencil, scaled_back(pencil, 1.0)) is None
     assert (
-        factorize(normalize(Laplacian(sp.csr_array((2, 2)), sp.csr_array(sp.eye_array(2)))), 0.0)
+        Factor.at(normalize(Laplacian(sp.csr_array((2, 2)), sp.csr_array(sp.eye_array(2)))), 0.0)
         is None
     )
 
@@ -68,13 +67,13 @@ def unpacked(factor):
 @pytest.mark.parametrize("share", [0.1, 0.3, 1.0])
 def test_the_rounding_bound_covers_the_rounding(laplacian, share):
     pencil = normalize(laplacian)
-    factor = factorize(pencil, share * pencil.level)
+    factor = Factor.at(pencil, share * pencil.level)
     lower, pivots = np.longdouble(unpacked(factor.lower)), np.longdouble(factor.lower.pivots)
     order = factor.lower.elimination.order
     matrix = (pencil.stiffness - factor.shift * pencil.mass).toarray()[np.ix_(order, order)]
     product = lower @ (pivots[:, None] * lower.T)  # L D Lᵀ in extended precision
     error = np.abs(product - matrix).sum(axis=1)
-    assert (error <= rounding(factor)[order]).all()
+    assert (error <= factor.rounding()[order]).all()
     assert error.max() > 0
     assert factor.count == np.count_nonzero(pivots < 0)
 
@@ -83,10 +82,10 @@ def test_slack_is_taken_off_the_diagonal():
     pencil = normalize(graph(path(30)))
     slack = np.full(30, 0.11)
     one, two = (
-        factorize(pencil, 0.37, slack),
-        factorize(pencil, 0.48),
+        Factor.at(pencil, 0.37, slack),
+        Factor.at(pencil, 0.48),
     )  # B is 1, so slack is a shift
-    assert one.count == two.count > factorize(pencil, 0.37).count
+    assert one.count == two.count > Factor.at(pencil, 0.37).count
     right = np.arange(30.0)[:, None]
     np.testing.assert_allclose(one.solve(right), two.solve(right))
 
@@ -99,7 +98,7 @@ def test_the_shift_stands_among_the_wanted(laplacian, k):
 
 
 def test_a_shift_without_a_factor_is_an_error(monkeypatch):
-    monkeypatch.setattr(shift_module, "factorize", lambda *args: None)
+    monkeypatch.setattr(shift_module.Factor, "at", lambda *args: None)
     with pytest.raises(
         ConvergenceError,
         match=r"must have its pivots on the diagonal, and little rounding; none has",
@@ -123,7 +122,7 @@ def test_residual_bounds_hold_for_a_full_mass():
     vectors = np.random.default_rng(0).standard_normal((pencil.n, 7))
     values = np.linspace(0, reference[-1], 7)
     nearest = np.abs(reference[:, None] - values).min(axis=0)
-    assert (nearest <= residual_norms(pencil, values, vectors)).all()
+    assert (nearest <= pencil.residual_norms(values, vectors)).all()
     assert 0.2 < pencil.mass_floor < 0.5
 
 

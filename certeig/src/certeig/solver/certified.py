@@ -10,7 +10,7 @@ from certeig.kit.errors import ConvergenceError, InvalidParameterError
 from certeig.kit.progress import Progress
 from certeig.solver.certify import quality, take_pairs
 from certeig.solver.diagnosis import require_solvable
-from certeig.solver.eigenpairs import Pairs, error_bound, lowest_pairs, polish
+from certeig.solver.eigenpairs import Pairs, lowest_pairs, polish
 from certeig.solver.factor import Factor
 from certeig.solver.inertia import count_beside
 from certeig.solver.lanczos import Wanted, block_lanczos
@@ -187,7 +187,7 @@ def _complete(
             first=lower.count,
             shift=upper.shift,
             count=upper.count - lower.count,
-            gap=(float(pairs.values[after[0]]) + error_bound(pairs), upper.shift),
+            gap=(float(pairs.values[after[0]]) + pairs.error_bound, upper.shift),
             resolution=float(np.abs(pairs.values - upper.shift).min()),
         )
         missing = certificate.n_missing

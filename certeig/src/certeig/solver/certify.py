@@ -11,15 +11,10 @@ from certeig.kit.errors import ConvergenceError, InvalidParameterError
 from certeig.kit.threads import map_in_threads
 from certeig.kit.typing import ArrayLike
 from certeig.solver.diagnosis import remedy_for
-from certeig.solver.eigenpairs import Pairs, error_bound
+from certeig.solver.eigenpairs import Pairs
 from certeig.solver.factor import Factor
 from certeig.solver.inertia import count_beside
-from certeig.solver.pencil import (
-    Pencil,
-    column_chunks,
-    gram_columns,
-    residual_norms,
-)
+from certeig.solver.pencil import Pencil, column_chunks, gram_columns
 
 # Eigenvalues closer than this, relative to the largest one, form a cluster.
 RESOLUTION = 1e-6
@@ -66,8 +61,8 @@ def certify_pairs(
         )
     own = pencil.places_in(values)
     vectors = np.ldexp(vectors, -pencil.vector_exponent)
-    certificate = prove(pencil, Pairs(own, vectors, residual_norms(pencil, own, vectors)))
-    return in_user_units(pencil, certificate), float(values[-1])
+    certificate = prove(pencil, Pairs(own, vectors, pencil.residual_norms(own, vectors)))
+    return pencil.certificate_out(certificate), float(values[-1])
 
 
 def prove(
@@ -121,7 +116,7 @@ def prove(
 
 def distinct_from(pencil: Pencil, pairs: Pairs) -> float:
     """Return the distance from which two eigenvalues count as different."""
-    return max(RESOLUTION * _scale(pencil, pairs), 4 * error_bound(pairs))
+    return max(RESOLUTION * _scale(pencil, pairs), 4 * pairs.error_bound)
 
 
 def quality(pencil: Pencil, pairs: Pairs) -> Certificate:
@@ -151,15 +146,6 @@ def quality(pencil: Pencil, pairs: Pairs) -> Certificate:
     )
 
 
-def in_user_units(pencil: Pencil, certificate: Certificate) -> Certificate:
-    """Return the certificate with every value in the user's units."""
-    shift, floor, low, high = pencil.places_out(
-        np.array([certificate.shift, certificate.floor, *certificate.gap])
-    ).tolist()
-    resolution = float(np.ldexp(certificate.resolution, pencil.value_exponent))
-    return replace(certificate, shift=shift, floor=floor, gap=(low, high), resolution=resolution)
-
-
 def take_pairs(
     pencil: Pencil, pairs: Pairs, certificate: Certificate, start: int, stop: int
 ) -> tuple[Pairs, Certificate]:
@@ -180,7 +166,7 @@ def take_pairs(
 def with_count(certificate: Certificate, pairs: Pairs, shift: float, count: int) -> Certificate:
     """Return the certificate of pairs with the number of all eigenvalues below a shift."""
     n_found = int(np.count_nonzero(pairs.values < shift))
-    low = float(pairs.values[n_found - 1]) + error_bound(pairs) if n_found else -np.inf
+    low = float(pairs.values[n_found - 1]) + pairs.error_bound if n_found else -np.inf
     return replace(
         certificate,
         shift=shift,

@@ -14,7 +14,7 @@ from certeig.certificate import Certificate
 from certeig.kit.errors import ConvergenceError
 from certeig.solver.certify import distinct_from, quality, with_count
 from certeig.solver.eigenpairs import Pairs
-from certeig.solver.factor import Factor, rounding
+from certeig.solver.factor import Factor
 from certeig.solver.pencil import Pencil
 
 # Entries below this share of the largest ones beside the diagonal, in their row and their column,
@@ -92,7 +92,7 @@ def _most_missing(
     solved = below.solve(weighed)
     # On the y, W₀ - γB has as many negative eigenvalues as everywhere, less those of
     # VᵀB (W₀ - γB)⁻¹ BV (Haynsworth 1968). Rounding changes W₀ - γB by E, |xᵀEx| ≤ Σ r_i x_i².
-    loss = rounding(below)
+    loss = below.rounding()
     projected = weighed.T @ solved
     on_pairs = np.linalg.eigvalsh((projected + projected.T) / 2)
     error = 2 * float(np.einsum("ij,i,ij->", solved, loss, solved))

@@ -10,7 +10,7 @@ from jaxtyping import Float, Int
 from certeig.kit.arrays import record
 from certeig.kit.progress import Progress, silent
 from certeig.solver.eigenpairs import Pairs
-from certeig.solver.pencil import Pencil, part_pencil, residual_norms
+from certeig.solver.pencil import Pencil, part_pencil
 from certeig.solver.shift import expected_values, factor_below
 from certeig.spectrum import ZERO_RESIDUALS
 
@@ -188,7 +188,7 @@ def _solve_blocks(
         values, vectors = np.linalg.eigh(inverse @ stiffness @ inverse.transpose(0, 2, 1))
         vectors = inverse.transpose(0, 2, 1) @ vectors
     rests = stiffness @ vectors - mass @ vectors * values[:, None, :]
-    squares = np.square(rests) / diagonal / parts.pencil.mass_floor  # as in `residual_norms`
+    squares = np.square(rests) / diagonal / parts.pencil.mass_floor  # as in `Pencil.residual_norms`
     return values, vectors, np.sqrt(squares.sum(axis=1))
 
 
@@ -225,4 +225,4 @@ def merge_pairs(parts: Parts, found: list[Pairs], k: int) -> Pairs:
         vectors[np.ix_(parts.points(number), places)] = found[number].vectors[
             :, column[lowest[places]]
         ]
-    return Pairs(merged, vectors, residual_norms(parts.pencil, merged, vectors))
+    return Pairs(merged, vectors, parts.pencil.residual_norms(merged, vectors))

@@ -41,10 +41,10 @@ class Pairs:
         """Return some of the pairs."""
         return Pairs(self.values[chosen], self.vectors[:, chosen], self.residuals[chosen])
 
-
-def error_bound(pairs: Pairs) -> float:
-    """Bound the distance of the values to eigenvalues, matched one to one (Kahan 1967)."""
-    return float(np.linalg.norm(pairs.residuals))
+    @property
+    def error_bound(self) -> float:
+        """Bound the distance of the values to eigenvalues, matched one to one (Kahan 1967)."""
+        return float(np.linalg.norm(self.residuals))
 
 
 def polish(pencil: Pencil, factor: Factor, pairs: Pairs) -> Pairs:

@@ -6,8 +6,8 @@ import numpy as np
 from jaxtyping import Float
 
 from certeig.kit.errors import ConvergenceError
-from certeig.solver.eigenpairs import Pairs, error_bound
-from certeig.solver.factor import Factor, factorize, rounding
+from certeig.solver.eigenpairs import Pairs
+from certeig.solver.factor import Factor
 from certeig.solver.pencil import Pencil
 
 # Factor by which σ moves away from the eigenvalue if rounding could move it across.
@@ -45,14 +45,14 @@ def count_below_shift(pencil: Pencil, shift: float) -> int:
 
 def bound_count(pencil: Pencil, shift: float, side: float) -> int | None:
     """Bound the number of eigenvalues below a shift, from above or (side -1) below; None if rounding forbids it."""
-    plain = factorize(pencil, shift)
-    if plain is None or not np.isfinite(loss := rounding(plain)).all():
+    plain = Factor.at(pencil, shift)
+    if plain is None or not np.isfinite(loss := plain.rounding()).all():
         return None
     # W - σB - S with S above the rounding is nowhere above W - σB, and has at least as many negative
     # eigenvalues; with -S it has at most as many.
     slack = SLACK * loss
-    moved = factorize(pencil, shift, side * slack)
-    return moved.count if moved and (rounding(moved) <= slack).all() else None
+    moved = Factor.at(pencil, shift, side * slack)
+    return moved.count if moved and (moved.rounding() <= slack).all() else None
 
 
 def count_beside(
@@ -79,7 +79,7 @@ def count_beside(
         pairs.vectors[:, index] ** 2,
         1.0 if most else -1.0,
     )
-    found_error = error_bound(pairs)
+    found_error = pairs.error_bound
 
     def uncertainty(slack: Float[np.ndarray, " n"]) -> float:
         # How far the slack moves this eigenvalue, to first order, and the error of the value.
@@ -95,12 +95,12 @@ def count_beside(
     slack = none
     if beside:
         # What was enough for this factor, or would have been.
-        slack = beside.slack if beside.slack.any() else padded(rounding(beside))
+        slack = beside.slack if beside.slack.any() else padded(beside.rounding())
     if too_much(uncertainty(slack), sigma):
         slack = none
     for _ in range(COUNT_TRIALS):
-        factor = factorize(pencil, sigma, side * slack, factor)
-        loss = rounding(factor) if factor else np.full(pencil.n, np.inf)
+        factor = Factor.at(pencil, sigma, side * slack, factor)
+        loss = factor.rounding() if factor else np.full(pencil.n, np.inf)
         # What is above the slack moves σ: W - σB - S + E ≤ W - (σ - ρ)B where no row has more than
         # ρ c D of it.
         over = float(((loss - slack) / pencil.mass_diagonal).max(initial=0.0)) / pencil.mass_floor

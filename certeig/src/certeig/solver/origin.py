@@ -7,9 +7,9 @@ from jaxtyping import Float
 
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.matrices import find_zero_row_sums
-from certeig.solver.factor import factorize
+from certeig.solver.factor import Factor
 from certeig.solver.inertia import bound_count
-from certeig.solver.pencil import Pencil, normalize
+from certeig.solver.pencil import Pencil
 from certeig.solver.strategy import is_filled
 
 # Eigenvalues down to minus this share of trace W / trace B may be rounding of 0.
@@ -36,7 +36,7 @@ def pencil_from_zero(stiffness: sp.csr_array, mass: sp.csr_array) -> Pencil:
     Raises an InvalidParameterError as `normalize` does, or if eigenvalues are beyond the range of
     floats.
     """
-    pencil = normalize(stiffness, mass)
+    pencil = Pencil.scaled(stiffness, mass)
     _require_representable(pencil)
     least = _gershgorin(pencil)
     dominant = least >= -DOMINANCE_ROUNDING
@@ -54,7 +54,7 @@ def pencil_from_zero(stiffness: sp.csr_array, mass: sp.csr_array) -> Pencil:
         return pencil
     origin = pencil.place_out(floor)
     moved = sp.csr_array(stiffness - origin * mass)
-    return normalize(moved, mass, known_floor=pencil.mass_floor, origin=origin)
+    return Pencil.scaled(moved, mass, known_floor=pencil.mass_floor, origin=origin)
 
 
 def _require_representable(pencil: Pencil) -> None:
@@ -78,7 +78,7 @@ def _raised(pencil: Pencil, floor: float) -> float:
     """Raise a lower bound of all eigenvalues until the lowest is near it, as inverse iteration shows."""
     vectors = np.random.default_rng(0).standard_normal((pencil.n, min(COLUMNS, pencil.n)))
     for _ in range(MOST_ROUNDS):
-        factor = factorize(pencil, floor)
+        factor = Factor.at(pencil, floor)
         if factor is None:
             return floor
         for _ in range(STEPS):

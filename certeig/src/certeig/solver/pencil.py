@@ -9,12 +9,13 @@ from jaxtyping import Float, Int
 from scipy.sparse.csgraph import connected_components
 
 from certeig.advice import Advice
+from certeig.certificate import Certificate
 from certeig.kit.arrays import EPS, record
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.threads import map_in_threads
 from certeig.solver.residual_loops import add_sums
 from certeig.sparse.elimination import Elimination, analyze_pattern
-from certeig.sparse.symmetric_factor import FactorMemory, factor_memory, factorize_symmetric
+from certeig.sparse.symmetric_factor import FactorMemory, SymmetricFactor, factor_memory
 
 # Columns that are processed together: enough for fast products, with little memory.
 COLUMNS_AT_ONCE = 64
@@ -92,6 +93,38 @@ class Pencil:
     saturation: float = 0.0
     advice: Advice = ADVICE
 
+    @classmethod
+    def scaled(
+        cls,
+        stiffness: sp.sparray,
+        mass: sp.sparray,
+        *,
+        known_floor: float = 0.0,
+        saturation: float = 0.0,
+        origin: float = 0.0,
+        advice: Advice = ADVICE,
+    ) -> "Pencil":
+        """Scale W and B by powers of two, and find a lower bound of B.
+
+        `known_floor` is a c with B ≥ c diag(B) that is known from how B was made, or 0. `origin` is the
+        value by which the user's eigenvalues are larger than those of W and B.
+
+        Raises an InvalidParameterError if B is not positive definite, or entries on a diagonal lie too
+        far apart for floats.
+        """
+        _require_range(advice.stiffness, stiffness.diagonal())
+        _require_range(advice.mass, mass.diagonal())
+        pencil = _pencil(stiffness, mass, known_floor=known_floor, advice=advice)
+        return replace(pencil, saturation=saturation, origin=origin)
+
+    @classmethod
+    def unscaled(cls, stiffness: sp.sparray, mass: sp.sparray, advice: Advice = ADVICE) -> "Pencil":
+        """Make a pencil without scaling, for entries that are already of moderate size.
+
+        Raises an InvalidParameterError if B is not positive definite.
+        """
+        return _pencil(stiffness, mass, scaled=False, advice=advice)
+
     @property
     def n(self) -> int:
         """Number of points."""
@@ -128,28 +161,44 @@ class Pencil:
         """Return B-normalized vectors in the user's units."""
         return np.ldexp(vectors, self.vector_exponent)
 
+    def certificate_out(self, certificate: Certificate) -> Certificate:
+        """Return the certificate with every value in the user's units."""
+        shift, floor, low, high = self.places_out(
+            np.array([certificate.shift, certificate.floor, *certificate.gap])
+        ).tolist()
+        resolution = float(np.ldexp(certificate.resolution, self.value_exponent))
+        return replace(
+            certificate, shift=shift, floor=floor, gap=(low, high), resolution=resolution
+        )
 
-def normalize(
-    stiffness: sp.sparray,
-    mass: sp.sparray,
-    *,
-    known_floor: float = 0.0,
-    saturation: float = 0.0,
-    origin: float = 0.0,
-    advice: Advice = ADVICE,
-) -> Pencil:
-    """Scale W and B by powers of two, and find a lower bound of B.
+    def residual_norms(
+        self, values: Float[np.ndarray, " k"], vectors: Float[np.ndarray, "n k"]
+    ) -> Float[np.ndarray, " k"]:
+        """Bound the distance of each value to an eigenvalue.
 
-    `known_floor` is a c with B ≥ c diag(B) that is known from how B was made, or 0. `origin` is the
-    value by which the user's eigenvalues are larger than those of W and B.
+        |λ - eigenvalue| ≤ ‖Wφ - λBφ‖ / ‖φ‖ with the norms of B⁻¹ and B (Parlett 1998, theorem 15.9.1); B⁻¹ ≤ (cD)⁻¹.
+        """
+        _, lengths, squares = _sums(self, vectors, values)
+        return np.sqrt(squares / self.mass_floor / lengths)
 
-    Raises an InvalidParameterError if B is not positive definite, or entries on a diagonal lie too
-    far apart for floats.
-    """
-    _require_range(advice.stiffness, stiffness.diagonal())
-    _require_range(advice.mass, mass.diagonal())
-    pencil = _pencil(stiffness, mass, known_floor=known_floor, advice=advice)
-    return replace(pencil, saturation=saturation, origin=origin)
+    def to_user_vectors(self, vectors: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
+        """Convert vectors in place to the user's units and the signs of `Spectrum`.
+
+        The result is read-only.
+        """
+        vectors = np.ascontiguousarray(vectors)
+        signs = np.ones(vectors.shape[1])
+
+        def choose_signs(columns: slice) -> None:
+            part = vectors[:, columns]
+            sizes = np.abs(part)
+            leading = np.argmax(sizes >= (1 - 1e-6) * sizes.max(axis=0), axis=0)
+            signs[columns] = np.where(part[leading, np.arange(part.shape[1])] < 0, -1.0, 1.0)
+
+        map_in_threads(choose_signs, column_chunks(vectors.shape[1]))
+        vectors *= self.vectors_out(signs[None])
+        vectors.flags.writeable = False
+        return vectors
 
 
 def part_pencil(whole: Pencil, stiffness: sp.sparray, mass: sp.sparray) -> Pencil:
@@ -162,14 +211,6 @@ def part_pencil(whole: Pencil, stiffness: sp.sparray, mass: sp.sparray) -> Penci
         value_exponent=whole.value_exponent + part.value_exponent,
         vector_exponent=whole.vector_exponent + part.vector_exponent,
     )
-
-
-def as_pencil(stiffness: sp.sparray, mass: sp.sparray, advice: Advice = ADVICE) -> Pencil:
-    """Make a pencil without scaling, for entries that are already of moderate size.
-
-    Raises an InvalidParameterError if B is not positive definite.
-    """
-    return _pencil(stiffness, mass, scaled=False, advice=advice)
 
 
 def _pencil(
@@ -286,7 +327,9 @@ def _mass_floor(
     # B - cD is positive definite exactly when all its pivots are positive.
     pattern = _shift_pattern(mass, sp.csc_array(sp.diags_array(diagonal)))
     for floor in floors.tolist():
-        lower = factorize_symmetric(pattern.elimination, pattern.stiffness - floor * pattern.mass)
+        lower = SymmetricFactor.of_entries(
+            pattern.elimination, pattern.stiffness - floor * pattern.mass
+        )
         if lower and (lower.pivots > 0).all():
             return floor
     place = int(np.argmax(lower.pivots <= 0)) if lower else 0
@@ -309,7 +352,7 @@ def largest_bound(pencil: Pencil) -> float:
 def rayleigh_residuals(
     pencil: Pencil, vectors: Float[np.ndarray, "n k"], near: Float[np.ndarray, " k"] | None = None
 ) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
-    """Return Rayleigh quotients of the columns and their error bounds (`residual_norms`).
+    """Return Rayleigh quotients of the columns and their error bounds (`Pencil.residual_norms`).
 
     Numbers near the quotients, where B is diagonal, save half of the products.
     """
@@ -318,17 +361,6 @@ def rayleigh_residuals(
         # ‖Wφ - λBφ‖² = ‖Wφ - νBφ‖² - (λ - ν)² ‖Bφ‖² for ν near the quotient λ, in the norm of B⁻¹.
         squares = np.maximum(squares - (values - near) ** 2 * lengths, EPS * squares)
     return values, np.sqrt(squares / pencil.mass_floor / lengths)
-
-
-def residual_norms(
-    pencil: Pencil, values: Float[np.ndarray, " k"], vectors: Float[np.ndarray, "n k"]
-) -> Float[np.ndarray, " k"]:
-    """Bound the distance of each value to an eigenvalue.
-
-    |λ - eigenvalue| ≤ ‖Wφ - λBφ‖ / ‖φ‖ with the norms of B⁻¹ and B (Parlett 1998, theorem 15.9.1); B⁻¹ ≤ (cD)⁻¹.
-    """
-    _, lengths, squares = _sums(pencil, vectors, values)
-    return np.sqrt(squares / pencil.mass_floor / lengths)
 
 
 def _sums(
@@ -377,23 +409,3 @@ def gram_columns(
 def column_chunks(k: int) -> list[slice]:
     """Split k columns into slices, so that intermediate results stay small."""
     return [slice(start, min(start + COLUMNS_AT_ONCE, k)) for start in range(0, k, COLUMNS_AT_ONCE)]
-
-
-def to_user_vectors(pencil: Pencil, vectors: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
-    """Convert vectors in place to the user's units and the signs of `Spectrum`.
-
-    The result is read-only.
-    """
-    vectors = np.ascontiguousarray(vectors)
-    signs = np.ones(vectors.shape[1])
-
-    def choose_signs(columns: slice) -> None:
-        part = vectors[:, columns]
-        sizes = np.abs(part)
-        leading = np.argmax(sizes >= (1 - 1e-6) * sizes.max(axis=0), axis=0)
-        signs[columns] = np.where(part[leading, np.arange(part.shape[1])] < 0, -1.0, 1.0)
-
-    map_in_threads(choose_signs, column_chunks(vectors.shape[1]))
-    vectors *= pencil.vectors_out(signs[None])
-    vectors.flags.writeable = False
-    return vectors

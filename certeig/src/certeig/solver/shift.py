@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 from certeig.kit.errors import ConvergenceError
-from certeig.solver.factor import Factor, factorize
+from certeig.solver.factor import Factor
 from certeig.solver.pencil import Pencil
 
 # Of the k wanted eigenvalues this share lies below the shift. On a surface counts grow like
@@ -75,7 +75,7 @@ def factorize_near(pencil: Pencil, shift: float) -> Factor:
     Raises a ConvergenceError if that is so at all of them.
     """
     for nudge in SHIFT_NUDGES:
-        factor = factorize(pencil, nudge * shift)
+        factor = Factor.at(pencil, nudge * shift)
         if factor and _serves(pencil, factor):
             return factor
     raise ConvergenceError(

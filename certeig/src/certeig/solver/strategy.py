@@ -11,7 +11,7 @@ from certeig.certificate import Certificate
 from certeig.kit.errors import ConvergenceError
 from certeig.kit.memory import require_memory
 from certeig.kit.progress import Progress
-from certeig.solver.certify import in_user_units, prove, take_pairs
+from certeig.solver.certify import prove, take_pairs
 from certeig.solver.chebyshev import chebyshev_filter
 from certeig.solver.complement import prove_outside, sparser_below
 from certeig.solver.components import solve_parts
@@ -133,7 +133,7 @@ def _solve_dense(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certi
 def _prove_complete(pencil: Pencil, pairs: Pairs) -> tuple[Pairs, Certificate]:
     certificate = prove(pencil, pairs)
     if not certificate.complete:
-        raise ConvergenceError(in_user_units(pencil, certificate).explain())
+        raise ConvergenceError(pencil.certificate_out(certificate).explain())
     return pairs, certificate
 
 

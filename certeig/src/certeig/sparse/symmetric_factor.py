@@ -5,6 +5,7 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 
 from certeig.kit.arrays import EPS, record
+from certeig.kit.blas import blas_routines
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.threads import (
     SpareMemory,
@@ -15,7 +16,6 @@ from certeig.kit.threads import (
 from certeig.kit.typing import ArrayLike
 from certeig.sparse import front_loops as fronts
 from certeig.sparse.basis_loops import LANES
-from certeig.sparse.blas import blas_routines
 from certeig.sparse.elimination import Elimination, analyze_pattern
 
 Indices = Int[np.ndarray, " ..."]
@@ -40,6 +40,54 @@ class SymmetricFactor:
     elimination: Elimination
     panels: Float[np.ndarray, " e"]
     pivots: Float[np.ndarray, " n"]
+
+    @classmethod
+    def of_entries(
+        cls,
+        elimination: Elimination,
+        data: Float[np.ndarray, " e"],
+        memory: "FactorMemory | None" = None,
+        spent: "SymmetricFactor | None" = None,
+    ) -> "SymmetricFactor | None":
+        """Factor the matrix with these entries; return None if a pivot is zero or not finite.
+
+        The panels of a spent factor, if one is given, are filled anew.
+        """
+        e = elimination
+        memory = memory or factor_memory(e)
+        tree = e.first, e.begins, e.rows, e.last_child, e.older, e.places
+        lower = e.lower_ptr, e.lower_rows, data[e.source]
+        panels = np.empty(e.n_entries) if spent is None else spent.panels
+        pivots = np.empty(len(e.order))
+
+        def factor_task(task: int) -> bool:
+            """Factor the fronts of a task; return whether all pivots are usable."""
+            begin, end = int(e.tasks.first[task]), int(e.tasks.first[task + 1])
+            with memory.rooms.lend() as room:
+                given = tree, lower, panels, pivots, updates, room
+                return bool(
+                    fronts.factor_fronts(*given, begin, end, int(e.stacks[task]), blas_routines())
+                )
+
+        with memory.updates.lend() as updates:
+            for tasks in e.tasks.rounds:
+                if not all(map_in_threads(factor_task, tasks.tolist())):
+                    return None
+        return cls(e, panels, pivots)
+
+    @classmethod
+    def of(
+        cls, matrix: sp.sparray, similar: "SymmetricFactor | None" = None
+    ) -> "SymmetricFactor | None":
+        """Factor one symmetric matrix; return None if a pivot is zero or not finite.
+
+        The order of elimination is that of a factor of a matrix with the same pattern, if one is given.
+        """
+        columns = sp.csc_array(matrix)
+        columns.sort_indices()
+        with one_blas_thread():
+            elimination = analyze_pattern(columns) if similar is None else similar.elimination
+            return cls.of_entries(elimination, columns.data)
 
     @property
     def n_negative(self) -> int:
@@ -166,50 +214,3 @@ def factor_memory(elimination: Elimination) -> FactorMemory:
             lambda: (np.empty(square), np.empty(square), np.empty(n, dtype=np.int64))
         ),
     )
-
-
-def factorize_symmetric(
-    elimination: Elimination,
-    data: Float[np.ndarray, " e"],
-    memory: FactorMemory | None = None,
-    spent: SymmetricFactor | None = None,
-) -> SymmetricFactor | None:
-    """Factor the matrix with these entries; return None if a pivot is zero or not finite.
-
-    The panels of a spent factor, if one is given, are filled anew.
-    """
-    e = elimination
-    memory = memory or factor_memory(e)
-    tree = e.first, e.begins, e.rows, e.last_child, e.older, e.places
-    lower = e.lower_ptr, e.lower_rows, data[e.source]
-    panels = np.empty(e.n_entries) if spent is None else spent.panels
-    pivots = np.empty(len(e.order))
-
-    def factor_task(task: int) -> bool:
-        """Factor the fronts of a task; return whether all pivots are usable."""
-        begin, end = int(e.tasks.first[task]), int(e.tasks.first[task + 1])
-        with memory.rooms.lend() as room:
-            given = tree, lower, panels, pivots, updates, room
-            return bool(
-                fronts.factor_fronts(*given, begin, end, int(e.stacks[task]), blas_routines())
-            )
-
-    with memory.updates.lend() as updates:
-        for tasks in e.tasks.rounds:
-            if not all(map_in_threads(factor_task, tasks.tolist())):
-                return None
-    return SymmetricFactor(e, panels, pivots)
-
-
-def factor_matrix(
-    matrix: sp.sparray, similar: SymmetricFactor | None = None
-) -> SymmetricFactor | None:
-    """Factor one symmetric matrix; return None if a pivot is zero or not finite.
-
-    The order of elimination is that of a factor of a matrix with the same pattern, if one is given.
-    """
-    columns = sp.csc_array(matrix)
-    columns.sort_indices()
-    with one_blas_thread():
-        elimination = analyze_pattern(columns) if similar is None else similar.elimination
-        return factorize_symmetric(elimination, columns.data)

@@ -13,8 +13,6 @@ from .indexing import describe_all as describe_all
 from .indexing import learn_codebook as learn_codebook
 from .indexing import parse_filters as parse_filters
 from .indexing import parse_part as parse_part
-from .indexing import prune as prune
-from .indexing import read_stage as read_stage
 from .indexing import worker_processes as worker_processes
 from .parts import area_shares as area_shares
 from .parts import count_fragments as count_fragments
@@ -32,6 +30,7 @@ from .reading import read_examples as read_examples
 from .reading import read_map as read_map
 from .reading import repair_worn as repair_worn
 from .reading import shape_facts as shape_facts
+from .recipes import PRESETS as PRESETS
 from .recipes import index_recipe as index_recipe
 from .recipes import query_recipe as query_recipe
 from .sheets import CAPTION as CAPTION

@@ -15,9 +15,8 @@ from matplotlib.image import imsave
 from certeig.kit.files import replace_file
 from eigenshape._vectors import mean_radius
 from eigenshape.cli.steps.collecting import unsure_sides
-from eigenshape.collections.alignment import best_similarity
 from eigenshape.collections.carrying import CarriedLandmarks
-from eigenshape.collections.collection import Collection, unreflect
+from eigenshape.collections.collection import Collection
 from eigenshape.geometry.distances.closest import closest_points
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.samples.surface_points import place_points
@@ -58,7 +57,7 @@ def write_collection_report(
                 "side": collection.sides[number],
                 "method": collection.methods[number],
                 "notes": collection.notes[name],
-                "picture": _picture(collection, number, unreflected[number], mean.vertices, camera),
+                "picture": _picture(collection, name, mean.vertices, camera),
                 "scores": scores[number].tolist(),
             }
         )
@@ -85,20 +84,12 @@ def write_collection_report(
 
 
 def _picture(
-    collection: Collection,
-    number: int,
-    own: Float[np.ndarray, "n 3"],
-    mean: Float[np.ndarray, "n 3"],
-    camera: Camera,
+    collection: Collection, name: str, mean: Float[np.ndarray, "n 3"], camera: Camera
 ) -> str:
     """Return the picture of a scan, placed by its own points on the mean, as the address of an image."""
-    mesh = collection.read_specimen(collection.names[number])
-    reflected = collection.reflected[number]
-    placing = best_similarity(own, mean, np.ones(len(mean)))
-    vertices = placing.move(unreflect(mesh.vertices[None], (reflected,))[0])
-    faces = mesh.faces[:, ::-1] if reflected else mesh.faces
+    mesh = collection.read_placed(name, mean)
     colors = np.broadcast_to(GRAY, (mesh.n_faces, 3))
-    image = draw(TriangleMesh(vertices, faces), camera, face_colors=colors).image
+    image = draw(mesh, camera, face_colors=colors).image
     file = BytesIO()
     imsave(file, image, format="png")
     return f"data:image/png;base64,{b64encode(file.getvalue()).decode()}"

@@ -60,15 +60,7 @@ def condense_file(
             f"fallen to {left:.2g} by then; take times from {needed:.2g} on, or more modes",
         )
     regions = condense(mesh, np.log(heat), tolerance)
-    columns = {
-        "region": np.arange(len(regions.areas)),
-        **dict(zip("xyz", regions.centers.T, strict=True)),
-        "area": regions.areas,
-        "n_vertices": np.bincount(regions.labels),
-    }
-    columns |= {
-        f"log_heat_{time:g}": mean for time, mean in zip(times, regions.values.T, strict=True)
-    }
+    columns = regions.table([f"log_heat_{time:g}" for time in times])
     return RegionTable(columns, len(regions.areas), regions.lost, error, notes)
 
 

@@ -3,7 +3,6 @@
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from pathlib import Path
 from typing import Any
 
 from certeig.kit.errors import InvalidParameterError
@@ -18,17 +17,16 @@ from eigenshape.retrieval.building.batch import (
     BatchReport,
     announce_learning,
     build_index,
-    read_stage,
     train_codebook_from_files,
 )
+from eigenshape.retrieval.heat.recipe import HeatRecipe
 from eigenshape.retrieval.index import ShapeIndex
-from eigenshape.retrieval.kinds import AnyRecipe
 from eigenshape.retrieval.patches.codebook import PatchCodebook, default_codebook
 from eigenshape.retrieval.patches.descriptor import PatchRecipe
 from eigenshape.retrieval.store.filters import choose_shapes, parse_filters
 
 # For the verbs, as they are, beside what is defined here
-__all__ = ["choose_shapes", "parse_filters", "read_stage"]
+__all__ = ["choose_shapes", "parse_filters"]
 
 RETRIES = 3  # workers of a cluster that a task may lose before it counts as failed
 
@@ -77,7 +75,7 @@ def worker_processes(
 def describe_all(
     index: ShapeIndex,
     items: Sequence[Item],
-    recipe: AnyRecipe | None,
+    recipe: HeatRecipe | PatchRecipe | None,
     workers: Workers,
     *,
     repairs: tuple[str, ...] = (),
@@ -124,16 +122,3 @@ def learn_codebook(
         return train_codebook_from_files(
             items, read_surface, repairs=repairs, workers=workers, callback=report
         )
-
-
-def prune(index: ShapeIndex, sources: Sequence[Path]) -> list[str]:
-    """Remove the shapes whose files lay in some folders and are no longer there; name them."""
-    folders = [source.absolute() for source in sources if source.is_dir()]
-    gone = []
-    for record in index.records():
-        path = Path(record.source) if record.source else None
-        if path and any(path.is_relative_to(folder) for folder in folders) and not path.exists():
-            gone.append(record.name)
-    if gone:
-        index.remove(*gone)  # in one step: each change of an index waits for the disk
-    return gone

@@ -9,16 +9,18 @@ from jaxtyping import Int
 
 from certeig.kit.progress import Progress
 from eigenshape.cli.console import print_table
+from eigenshape.cli.steps.recipes import PRESETS
 from eigenshape.deformation.region_patches import regions_of_patches
 from eigenshape.features.boundaries import smooth_boundaries
 from eigenshape.features.contrast import PART_CONTRAST
-from eigenshape.features.parts import find_parts, smooth_cut
-from eigenshape.features.segmentation import Segmentation, Tree
+from eigenshape.features.parts import find_parts
+from eigenshape.features.region_tree import MergeTree, PartTree
+from eigenshape.features.segmentation import Segmentation
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.orientation import orient_closed_outward
 from eigenshape.retrieval.heat.features import HeatFeatures, find_heat_features
-from eigenshape.retrieval.heat.recipe import PRESETS, HeatRecipe
+from eigenshape.retrieval.heat.recipe import HeatRecipe
 from eigenshape.spectral.signatures.approximate_heat import LARGE, USUAL_ACCURACY
 
 __all__ = ["regions_of_patches"]  # for the verbs, as it is, beside what is defined here
@@ -40,7 +42,7 @@ def count_fragments(shape: HeatFeatures) -> int:
 
 def find_tree(
     surface: TriangleMesh, method: str, progress: Progress
-) -> tuple[Tree, dict[str, Any], Callable[[Segmentation], Segmentation]]:
+) -> tuple[MergeTree | PartTree, dict[str, Any], Callable[[Segmentation], Segmentation]]:
     """Return the tree of a method, its default cut, and the function that smooths boundaries.
 
     Fragments are not counted as parts. Boundaries follow creases whichever way the faces of a
@@ -48,7 +50,7 @@ def find_tree(
     """
     if method == "parts":
         found = find_parts(surface, progress=progress)
-        return found.tree, {"persistence": PART_CONTRAST}, partial(smooth_cut, found)
+        return found.tree, {"persistence": PART_CONTRAST}, found.smooth
     shape = find_heat_features(surface, PRESETS[method], progress=progress)
     default = {"n_regions": PRESETS[method].n_features + count_fragments(shape)}
     return shape.tree, default, partial(smooth_boundaries, orient_closed_outward(surface))

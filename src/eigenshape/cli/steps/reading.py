@@ -24,11 +24,8 @@ from eigenshape.io import shape_files
 from eigenshape.io.attributes import MeshAttributes
 from eigenshape.io.carrying import carry_attributes
 from eigenshape.io.formats.registry import CellKind
-from eigenshape.io.labeled_shapes import (
-    find_labeled_shapes,
-    read_labeled_shape,
-    read_map,
-)
+from eigenshape.io.label_files import read_map
+from eigenshape.io.labeled_shapes import find_labeled_shapes, read_labeled_shape
 from eigenshape.io.mesh_files import read_mesh
 from eigenshape.io.surface_files import read_surface
 from eigenshape.retrieval.labels.labeled_shape import LabeledShape

@@ -8,16 +8,17 @@ from zipfile import BadZipFile
 from certeig.kit.errors import FileFormatError, InvalidParameterError
 from eigenshape._errors import StoreError
 from eigenshape.cli.console import err
-from eigenshape.retrieval.heat.recipe import PRESETS
+from eigenshape.retrieval.heat.recipe import SCALE_FREE, THESIS, HeatRecipe
 from eigenshape.retrieval.index import ShapeIndex
-from eigenshape.retrieval.kinds import AnyRecipe
 from eigenshape.retrieval.patches.codebook import read_codebook
 from eigenshape.retrieval.patches.descriptor import PatchRecipe
+
+PRESETS = {recipe.name: recipe for recipe in (SCALE_FREE, THESIS)}
 
 
 def index_recipe(
     index: ShapeIndex, name: str, codebook: Path | None, *, in_parts: bool, n_frames: int | None
-) -> AnyRecipe | None:
+) -> HeatRecipe | PatchRecipe | None:
     """Return the recipe by which an index describes shapes, or None if it is to learn a codebook."""
     if name != "patches":
         for option, value in (("--codebook", codebook), ("--frames", n_frames)):
@@ -63,12 +64,12 @@ def index_recipe(
     return kept
 
 
-def query_recipe(index: ShapeIndex, name: str | None) -> AnyRecipe:
+def query_recipe(index: ShapeIndex, name: str | None) -> HeatRecipe | PatchRecipe:
     """Return the recipe of a method by which an index can answer; without a name, its own."""
     if name is None:
         return index.default_recipe()
     if name == "patches":
-        recipe: AnyRecipe | None = _patch_recipe(index)
+        recipe: HeatRecipe | PatchRecipe | None = _patch_recipe(index)
     else:
         recipe = PRESETS[name] if PRESETS[name] in index.recipes() else None
     if recipe is None:

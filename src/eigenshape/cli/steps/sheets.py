@@ -21,7 +21,9 @@ from eigenshape.plot.camera import aim_camera
 from eigenshape.plot.sheet import Panel, figure_contact_sheet
 from eigenshape.retrieval.heat.features import find_heat_features, find_view_features
 from eigenshape.retrieval.heat.recipe import HeatRecipe
-from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, describe
+from eigenshape.retrieval.heat.score import HeatDescriptor
+from eigenshape.retrieval.kinds import describe
+from eigenshape.retrieval.patches.descriptor import PatchDescriptor, PatchRecipe
 from eigenshape.retrieval.search.matches import Match
 
 CAPTION = (
@@ -52,13 +54,13 @@ class ColoredQuery:
     """
 
     mesh: TriangleMesh
-    descriptor: Descriptor
+    descriptor: HeatDescriptor | PatchDescriptor
     labels: Int[np.ndarray, " f"]
     colors: Int[np.ndarray, " m"]
     dots: Int[np.ndarray, " p"]
 
 
-def color_query(mesh: TriangleMesh, recipe: AnyRecipe) -> ColoredQuery:
+def color_query(mesh: TriangleMesh, recipe: HeatRecipe | PatchRecipe) -> ColoredQuery:
     """Describe a query, and cut it into parts: around its features, or around the first of its patches."""
     if isinstance(recipe, HeatRecipe):
         shape = find_heat_features(mesh, recipe)

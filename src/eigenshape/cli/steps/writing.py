@@ -24,7 +24,7 @@ from eigenshape.io.formats.registry import (
     is_upright,
     suffix_of,
 )
-from eigenshape.io.labeled_shapes import write_labels
+from eigenshape.io.label_files import write_labels
 from eigenshape.io.mesh_files import read_mesh, save_mesh, write_mesh
 from eigenshape.matching.shape_match import ShapeMatch
 from eigenshape.plot.camera import UP_NAMES, VIEWS, Up, View

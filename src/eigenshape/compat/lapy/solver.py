@@ -1,7 +1,7 @@
 """A class with the calls of LaPy's `Solver`."""
 
 from collections.abc import Sequence
-from typing import Any, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
@@ -17,7 +17,6 @@ from eigenshape.calculus.linear_solver import factor_equations
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import Mesh, SimplicialMesh
 from eigenshape.operators.anisotropic import anisotropic_laplacian
-from eigenshape.operators.choices import Mass
 from eigenshape.operators.cotangent import cotangent_laplacian, linear_mass
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.solve import solve_spectrum
@@ -278,7 +277,7 @@ def _mesh_of(geometry: Any) -> Mesh:
     return kind(geometry.v, geometry.t)
 
 
-def _mass_name(lump: bool) -> Mass:
+def _mass_name(lump: bool) -> Literal["lumped", "consistent"]:
     return "lumped" if lump else "consistent"
 
 

@@ -8,9 +8,10 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int, Int32
 
-from certeig.kit.arrays import number_from_zero, positive_values, whole_number, whole_numbers
+from certeig.kit.arrays import number_from_zero, positive_values, whole_number
 from certeig.kit.threads import SpareMemory, map_in_threads, one_blas_thread
 from certeig.kit.typing import ArrayLike, Integer
+from eigenshape._arrays import source_points, source_sets
 from eigenshape._corners import in_length, scaled_corners
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
@@ -199,23 +200,6 @@ def _distances_from(
             is_nearer = (crossing >= 0) & (crossing <= side) & (straight < found)
         found = np.where(is_nearer, straight, found)
     return np.where(found <= reach, found, np.inf)
-
-
-def source_sets(sources: ArrayLike, n_points: int) -> list[Int[np.ndarray, " s"]]:
-    """Return the points of each source, ascending: a source is a point, or a set of points.
-
-    Raises an error if one is not a point.
-    """
-    try:
-        entries: list[Any] = list(sources)  # type: ignore[arg-type]
-    except (TypeError, KeyError):  # one number, or an object that is read by names
-        entries = [sources]
-    return [source_points(entry, n_points) for entry in entries]
-
-
-def source_points(source: ArrayLike, n_points: int) -> Int[np.ndarray, " s"]:
-    """Return the points of one source, ascending and each once. Raises an error if one is not a point."""
-    return np.unique(whole_numbers(source, "A source", 0, n_points - 1))
 
 
 def geodesic_waves(mesh: MeshLike) -> Wave:

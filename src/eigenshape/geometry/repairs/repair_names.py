@@ -18,6 +18,7 @@ MESH_REPAIRS = (
     *SURFACE_REPAIRS,
 )
 CLOUD_REPAIRS = ("auto", "drop_missing", "drop_duplicate_points")
+KNOWN_REPAIRS = tuple(dict.fromkeys((*MESH_REPAIRS, *CLOUD_REPAIRS)))  # of any shape
 
 
 def drops_missing(names: Sequence[str]) -> bool:

@@ -1,11 +1,9 @@
 """Points anywhere on a mesh, given by a simplex and barycentric coordinates."""
 
-from typing import Any
-
 import numpy as np
 from jaxtyping import Float, Int
 
-from certeig.kit.arguments import describe_value, require_type
+from certeig.kit.arguments import require_type
 from certeig.kit.arrays import ReadOnly, record, whole_number
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import Integer
@@ -109,22 +107,6 @@ def place_points(
     """Return the points with given barycentric coordinates in given simplices."""
     points = np.einsum("pc,pcd->pd", weights, mesh.points[mesh.simplices[simplices]])
     return SurfacePoints(points, simplices, weights)
-
-
-def vertex_number(n_vertices: int, vertex: Any, name: str) -> int:
-    """Return a vertex that was given where a SurfacePoints could be; raise an error if it is none."""
-    if not hasattr(vertex, "__index__"):
-        raise InvalidParameterError(
-            f"{name} must be a vertex or a SurfacePoints; the value is {describe_value(vertex)}. Find a "
-            "point from coordinates by closest_points(mesh, [point])."
-        )
-    return whole_number(vertex, name, 0, n_vertices - 1)
-
-
-def require_one(place: SurfacePoints, name: str) -> None:
-    """Raise an error if an argument has more points than one."""
-    if place.n_points != 1:
-        raise InvalidParameterError(f"{name} must be one point; there are {place.n_points}.")
 
 
 def require_on(mesh: Mesh, places: SurfacePoints, name: str) -> None:

@@ -10,7 +10,7 @@ from math import gamma, pi
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from certeig.kit.arguments import require_choice
 from certeig.kit.arrays import positive_values
@@ -21,6 +21,7 @@ from eigenshape._errors import InvalidShapeError
 from eigenshape._vectors import size_one
 from eigenshape.geometry.distances.geodesic import geodesic_balls
 from eigenshape.geometry.samples.quadrature import Quadrature
+from eigenshape.geometry.samples.spacing import neighbor_distance
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.operators.choices import Correction, Form
 from eigenshape.operators.clouds.cell_grid import cell_grid, count_partners, gaussian_rows
@@ -165,6 +166,26 @@ def _scale_by_power(values: Float[np.ndarray, " z"], exponent: int) -> Float[np.
     if exponent:
         values *= 2.0**exponent
     return values
+
+
+def time_range(spacing: float, eigenvalue: float, *, corrected: bool) -> tuple[float, float]:
+    """Return the heat times from which a kernel reaches neighbors, and up to which it tells an eigenvalue."""
+    radius = EDGE_FACTOR * spacing / 2
+    reach = radius * radius  # infinite if it overflows, where a power raises an error
+    return reach, (LAST if corrected else 0.5) / eigenvalue
+
+
+def sample_laplacian(
+    points: Float[np.ndarray, "n d"], dim: int, t: float, labels: Int[np.ndarray, " n"]
+) -> Laplacian:
+    """Build the Laplacian of a sample of a shape at a heat time; `labels` number its components.
+
+    Raise an error as `choose_kernel` and `require_whole` do.
+    """
+    kernel = choose_kernel(KernelOptions(t=t), neighbor_distance(points, dim))
+    laplacian = kernel_laplacian(Quadrature(points, None, dim), kernel)
+    require_whole(laplacian, labels, kernel)
+    return laplacian
 
 
 def require_whole(laplacian: Laplacian, labels: np.ndarray, kernel: GaussianKernel) -> None:

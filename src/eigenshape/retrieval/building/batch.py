@@ -9,7 +9,7 @@ from functools import partial
 from hashlib import sha256
 from itertools import chain
 from pathlib import Path
-from time import monotonic, time
+from time import monotonic
 from typing import Any
 
 from typing_extensions import TypeAliasType
@@ -28,7 +28,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair import repair
 from eigenshape.geometry.repairs.repair_names import require_repairs
 from eigenshape.geometry.repairs.repair_report import RepairedMesh
-from eigenshape.retrieval.index import ShapeIndex
+from eigenshape.retrieval.index import STAGE, ShapeIndex
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, describe_to_store
 from eigenshape.retrieval.patches.codebook import PatchCodebook, default_codebook
 from eigenshape.retrieval.patches.descriptor import PatchRecipe, patch_descriptor
@@ -48,7 +48,6 @@ Describe = Callable[[TriangleMesh], list[Any]]
 # Gaussians, and take some minutes; fewer than 40 leave it to the codebook of the library.
 FEWEST_TO_TRAIN, MOST_TO_TRAIN = 40, 100
 REPAIRS = "repairs"  # attribute of a shape that was repaired: what was done
-STAGE = "stage.txt"  # in the folder of an index, while it is prepared for its first shapes
 N_TRAINING_VIEWS = 2  # partial views of each closed shape that a codebook is learned from
 # Shapes are added together, at most this many, and at most this many seconds after the last ones.
 # One change costs 5 ms of CPU and some waits for the disk; a stopped build loses what is not added.
@@ -338,16 +337,6 @@ def announce_learning(folder: Path, callback: Callback) -> Iterator[Callback]:
         yield report
     finally:
         note.unlink(missing_ok=True)
-
-
-def read_stage(folder: Path) -> str | None:
-    """Return what is being done to an index before it holds shapes, and how old that note is."""
-    note = folder / STAGE
-    try:
-        age = max(time() - note.stat().st_mtime, 0)
-        return f"{note.read_text()}, {age:.0f} s ago"
-    except OSError:
-        return None
 
 
 def _learn_from(outcomes: Iterable[Outcome[_ReadFile]]) -> PatchCodebook:

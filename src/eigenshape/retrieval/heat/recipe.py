@@ -102,4 +102,3 @@ THESIS = HeatRecipe(
     reflections=True,
     n_shifts=0,
 )
-PRESETS = {recipe.name: recipe for recipe in (SCALE_FREE, THESIS)}

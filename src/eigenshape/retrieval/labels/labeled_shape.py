@@ -15,10 +15,8 @@ from eigenshape.geometry.orientation import orient_outward
 from eigenshape.geometry.requirements import require_describable
 from eigenshape.operators.smoothing import denoise
 from eigenshape.retrieval.patches.codebook import (
-    BASES,
-    N_SIZES,
     default_codebook,
-    whiten_numbers,
+    whiten_patches,
 )
 from eigenshape.retrieval.patches.matching import PatchPoints, patch_points
 from eigenshape.retrieval.patches.patches import surface_patches
@@ -76,14 +74,8 @@ def label_points(mesh: TriangleMesh) -> LabelPoints:
     distances = np.where(finite, distances, APART * farthest)
     codebook = default_codebook()
     numbers = [
-        np.concatenate(
-            [
-                whiten_numbers(found.numbers[:, base + size], codebook, place)
-                for place, base in enumerate(BASES)
-            ],
-            axis=1,
-        )
-        for size in range(N_SIZES)
+        np.concatenate(of_size, axis=1)
+        for of_size in whiten_patches(found, codebook).swapaxes(0, 1)
     ]
     # Radii of the largest balls that touch the surface at a point from either side
     unit = normalize_mesh(clean, "box")

@@ -23,7 +23,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.normalize import normalize_mesh
 from eigenshape.geometry.orientation import orient_closed_outward
 from eigenshape.geometry.requirements import require_describable
-from eigenshape.geometry.topology import edge_table, face_pairs
+from eigenshape.geometry.topology import edge_table
 from eigenshape.operators.anisotropic import anisotropic_laplacian, curvature_tensors
 from eigenshape.retrieval.labels.labeled_shape import LabeledShape, LabelPoints, label_points
 from eigenshape.retrieval.labels.transport import transport_points
@@ -330,7 +330,7 @@ def _settle(
 
 def _pieces(mesh: TriangleMesh, labels: Int[np.ndarray, " f"]) -> Int[np.ndarray, " f"]:
     """Find the connected pieces of equal labels."""
-    pairs, _ = face_pairs(edge_table(mesh))
+    pairs, _ = edge_table(mesh).face_pairs
     same = labels[pairs[:, 0]] == labels[pairs[:, 1]]
     return label_components(mesh.n_faces, *pairs[same].T)[1]
 
@@ -338,7 +338,7 @@ def _pieces(mesh: TriangleMesh, labels: Int[np.ndarray, " f"]) -> Int[np.ndarray
 def _join_small_pieces(mesh: TriangleMesh, labels: Int[np.ndarray, " f"]) -> Int[np.ndarray, " f"]:
     """Give each small piece the label with which it has most boundary in common."""
     table = edge_table(mesh)
-    pairs, edges = face_pairs(table)
+    pairs, edges = table.face_pairs
     ends = mesh.vertices[table.edges[edges]]
     lengths = np.linalg.norm(np.diff(ends, axis=1)[:, 0], axis=1)
     areas = face_areas(mesh)

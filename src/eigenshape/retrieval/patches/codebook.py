@@ -226,6 +226,19 @@ def whiten_numbers(
     return standardize(wide, codebook.means[place], codebook.spreads[place]) @ codebook.axes[place]
 
 
+def whiten_patches(shape: Patches, codebook: PatchCodebook) -> Float[np.ndarray, "b s m d"]:
+    """Whiten the numbers of patches at each base radius, and at those of each size beside it."""
+    return np.stack(
+        [
+            [
+                whiten_numbers(shape.numbers[:, base + size], codebook, place)
+                for size in range(N_SIZES)
+            ]
+            for place, base in enumerate(BASES)
+        ]
+    )
+
+
 def _fisher(
     shape: Patches, radius: int, codebook: PatchCodebook, place: int
 ) -> Float[np.ndarray, " v"]:

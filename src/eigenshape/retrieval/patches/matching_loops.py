@@ -3,8 +3,8 @@
 import numpy as np
 from jaxtyping import Float32, Float64
 
+from certeig.kit.blas import blas_routine
 from certeig.kit.kernels import Out, kernel
-from certeig.sparse.blas import blas_routine
 
 
 def leading(

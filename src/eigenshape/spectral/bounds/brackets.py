@@ -9,7 +9,7 @@ from certeig.kit.errors import InvalidParameterError
 from certeig.kit.progress import Progress
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import Integer
-from eigenshape._corners import in_length
+from eigenshape._corners import in_length, longest_edges
 from eigenshape._vectors import size_one
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.facets import facet_components, facet_table, without_pinches
@@ -18,7 +18,7 @@ from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import boundary_vertices
 from eigenshape.operators.choices import Condition
 from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.operators.crouzeix_raviart import interpolation_constants, longest_edges
+from eigenshape.operators.crouzeix_raviart import interpolation_constants
 from eigenshape.spectral.bounds.nonconforming import (
     enclose,
     lower_bounds,

@@ -9,8 +9,8 @@ from certeig.kit.errors import InvalidParameterError
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike
 from certeig.solver.certify import quality
-from certeig.solver.eigenpairs import Pairs, error_bound
-from certeig.solver.pencil import Pencil, residual_norms
+from certeig.solver.eigenpairs import Pairs
+from certeig.solver.pencil import Pencil
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.comparison.eigenspaces import (
     SEPARATED,
@@ -21,7 +21,8 @@ from eigenshape.spectral.comparison.eigenspaces import (
 )
 from eigenshape.spectral.kernel_values import to_pencil
 from eigenshape.spectral.pencils import normalize
-from eigenshape.spectral.spectrum import Spectrum, require_lowest
+from eigenshape.spectral.requirements import require_lowest
+from eigenshape.spectral.spectrum import Spectrum
 
 Vectors = Float[np.ndarray, "n p"]
 
@@ -190,7 +191,7 @@ def _unit_pairs(one: Spectrum, laplacian: Laplacian) -> tuple[Pencil, Pairs]:
     pencil = normalize(laplacian)
     values = np.ldexp(to_pencil(laplacian.kernel, one.eigenvalues), -pencil.value_exponent)
     vectors = np.ldexp(one.eigenvectors, -pencil.vector_exponent)
-    pairs = Pairs(values, vectors, residual_norms(pencil, values, vectors))
+    pairs = Pairs(values, vectors, pencil.residual_norms(values, vectors))
     quality(pencil, pairs)
     return pencil, pairs
 
@@ -212,7 +213,7 @@ def _bound(pencil: Pencil, pairs: Pairs, group: slice, pulled: Vectors) -> float
 
 def _distance(pairs: Pairs, group: slice, inside: Float[np.ndarray, " p"]) -> float:
     """Return how far the interval of some values is from the eigenvalues outside a group."""
-    stray = np.sqrt(2) * error_bound(pairs)
+    stray = np.sqrt(2) * pairs.error_bound
     above = pairs.values[group.stop] - stray - inside[-1]
     if group.start == 0:
         return float(above)

@@ -12,7 +12,8 @@ from certeig.kit.errors import InvalidParameterError
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike
 from eigenshape._arrays import require_finite_rows
-from eigenshape.spectral.spectrum import Spectrum, require_lowest
+from eigenshape.spectral.requirements import require_lowest
+from eigenshape.spectral.spectrum import Spectrum
 
 # Exact eigenvalues that differ by less than this share of the larger one are copies of one
 # eigenvalue: formulas evaluate them to about 1e-15.

@@ -11,8 +11,9 @@ from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.requirements import require_describable
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.spectral.bounds.brackets import Brackets
+from eigenshape.spectral.requirements import require_lowest
 from eigenshape.spectral.solve import solve_spectrum
-from eigenshape.spectral.spectrum import NULL, Spectrum, require_lowest
+from eigenshape.spectral.spectrum import NULL, Spectrum
 
 
 @record
@@ -138,24 +139,78 @@ def compare_spectra(
     require_lowest(one, "one")
     require_lowest(two, "two")
     k = min(len(one.eigenvalues), len(two.eigenvalues))
-    values = one.eigenvalues[:k], two.eigenvalues[:k]
-    bars = [within_residuals(one, k), within_residuals(two, k)]
-    zeros = bars[0][:, 0] <= 0, bars[1][:, 0] <= 0
     if brackets is not None:
         require_each(brackets, Brackets, "brackets")
-        bars = [
-            within_brackets(each, k, name)
-            for each, name in zip(brackets, ("one", "two"), strict=True)
-        ]
-    return SpectrumComparison(
-        one=values[0],
-        two=values[1],
-        intervals_one=bars[0],
-        intervals_two=bars[1],
-        relative=relative_change(*values, zero=zeros),
-        zero=zeros[0] & zeros[1],
-        bracketed=brackets is not None,
+    first, second = (
+        known_eigenvalues(spectrum, name, given, k)
+        for spectrum, name, given in zip(
+            (one, two), ("one", "two"), (None, None) if brackets is None else brackets, strict=True
+        )
     )
+    return SpectrumComparison(
+        one=first.values,
+        two=second.values,
+        intervals_one=first.intervals,
+        intervals_two=second.intervals,
+        relative=first.change_to(second),
+        zero=first.zero & second.zero,
+        bracketed=first.bracketed,
+    )
+
+
+@record
+class KnownEigenvalues:
+    """The lowest eigenvalues of one shape, and what is known of them.
+
+    Attributes
+    ----------
+    values : (k,) float
+    zero : (k,) bool
+        Whether each is 0 to rounding.
+    intervals : (k, 2) or (0, 2) float
+        Intervals that contain the exact eigenvalues; none where they are not known.
+    bracketed : bool
+        Whether the intervals are brackets.
+    """
+
+    values: Float[np.ndarray, " k"]
+    zero: Bool[np.ndarray, " k"]
+    intervals: Float[np.ndarray, "_ 2"]
+    bracketed: bool
+
+    def change_to(self, other: "KnownEigenvalues") -> Float[np.ndarray, " j"]:
+        """Return |two - one| / one as far as both are known: of two zeros 0, of one alone infinite."""
+        k = min(len(self.values), len(other.values))
+        zeros = self.zero[:k], other.zero[:k]
+        either, both = zeros[0] | zeros[1], zeros[0] & zeros[1]
+        one, two = self.values[:k], other.values[:k]
+        change = np.abs(two - one) / np.where(either, 1.0, one)
+        return np.where(either, np.where(both, 0.0, np.inf), change)
+
+
+def known_eigenvalues(
+    spectrum: Spectrum | ArrayLike,
+    name: str,
+    brackets: Brackets | None = None,
+    k: int | None = None,
+) -> KnownEigenvalues:
+    """Return what is known of the lowest k eigenvalues: by residuals of a spectrum, or by brackets.
+
+    Raises an InvalidParameterError if the spectrum does not begin with the lowest, a value is not
+    finite, or there are fewer brackets than eigenvalues.
+    """
+    intervals = np.empty((0, 2))
+    if isinstance(spectrum, Spectrum):
+        require_lowest(spectrum, name)
+        values = spectrum.eigenvalues[:k]
+        intervals = within_residuals(spectrum, len(values))
+        zero = intervals[:, 0] <= 0
+    else:
+        values = finite_values(spectrum, name)
+        zero = count_as_zero(values)
+    if brackets is not None:
+        intervals = within_brackets(brackets, len(values), name)
+    return KnownEigenvalues(values, zero, intervals, brackets is not None)
 
 
 def within_residuals(spectrum: Spectrum, k: int) -> Float[np.ndarray, "k 2"]:
@@ -181,18 +236,6 @@ def within_brackets(brackets: Brackets, k: int, name: str) -> Float[np.ndarray, 
 def count_as_zero(values: Float[np.ndarray, " k"]) -> Bool[np.ndarray, " k"]:
     """Return which of these eigenvalues are 0 beside the last."""
     return values <= NULL * values[-1]
-
-
-def relative_change(
-    one: Float[np.ndarray, " k"],
-    two: Float[np.ndarray, " k"],
-    *,
-    zero: tuple[Bool[np.ndarray, " k"], Bool[np.ndarray, " k"]],
-) -> Float[np.ndarray, " k"]:
-    """Return |two - one| / one, where masks say which of each are 0: of two zeros 0, of one alone infinite."""
-    either, both = zero[0] | zero[1], zero[0] & zero[1]
-    change = np.abs(two - one) / np.where(either, 1.0, one)
-    return np.where(either, np.where(both, 0.0, np.inf), change)
 
 
 def spectral_hausdorff_distance(one: ArrayLike, two: ArrayLike) -> float:

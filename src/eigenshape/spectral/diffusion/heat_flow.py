@@ -13,11 +13,13 @@ from certeig.kit.progress import Progress, silent
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike
 from certeig.solver.pencil import Pencil
-from certeig.sparse.symmetric_factor import SymmetricFactor, factorize_symmetric
+from certeig.sparse.symmetric_factor import SymmetricFactor
 from eigenshape._arrays import point_functions
-from eigenshape.operators.laplacian import Laplacian, require_matrix
+from eigenshape.operators.laplacian import Laplacian
+from eigenshape.operators.requirements import require_matrix
+from eigenshape.spectral.diffusion.decay import decay_factors
 from eigenshape.spectral.pencils import normalize
-from eigenshape.spectral.spectrum import Spectrum, decay_factors
+from eigenshape.spectral.spectrum import Spectrum
 
 # Largest error by default, relative to the norm of the values: 25 to 30 solves for each factor.
 DEFAULT_ACCURACY = 1e-10
@@ -176,7 +178,9 @@ def _flow_by_steps(
     for number, places in enumerate(groups):
         tau = step_time(own_times[places])
         pattern = pencil.shift_pattern
-        factor = factorize_symmetric(pattern.elimination, pattern.mass + tau * pattern.stiffness)
+        factor = SymmetricFactor.of_entries(
+            pattern.elimination, pattern.mass + tau * pattern.stiffness
+        )
         if factor is None or (factor.pivots <= 0).any():
             raise InvalidParameterError(
                 "The operator must have no negative eigenvalue, or heat grows without limit; B + τW is "

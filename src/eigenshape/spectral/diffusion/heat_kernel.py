@@ -7,7 +7,8 @@ from certeig.kit.arrays import ReadOnly, freeze, record, whole_numbers
 from certeig.kit.memory import require_memory
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike
-from eigenshape.spectral.spectrum import Spectrum, decay_factors
+from eigenshape.spectral.diffusion.decay import decay_factors
+from eigenshape.spectral.spectrum import Spectrum
 
 
 @one_blas_thread()

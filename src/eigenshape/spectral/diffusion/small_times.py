@@ -11,12 +11,8 @@ from certeig.kit.errors import InvalidParameterError
 from certeig.kit.text import Shown
 from certeig.kit.typing import ArrayLike
 from eigenshape.operators.choices import Condition
-from eigenshape.spectral.spectrum import (
-    Spectrum,
-    count_zero_modes,
-    exponential_decay,
-    require_lowest,
-)
+from eigenshape.spectral.requirements import require_lowest
+from eigenshape.spectral.spectrum import Spectrum
 
 # Eigenvalues that are needed at least. With fewer, the shortest times are as long as the shape.
 FEWEST_EIGENVALUES = 50
@@ -240,7 +236,7 @@ def _require_eigenvalues(
             f"eigenvalues must be ascending and at least 0; entry {bad[0]} is {values[bad[0]]:.6g}."
         )
     n_small = int(np.count_nonzero(values <= ZERO * values[-1]))
-    n_zero = n_small if spectrum is None else count_zero_modes(spectrum)
+    n_zero = n_small if spectrum is None else spectrum.n_zero_modes
     if boundary == "dirichlet" and n_zero:
         raise InvalidParameterError(
             f"With the Dirichlet condition no eigenvalue is 0; {n_zero} are. Pass fixed= to "
@@ -264,14 +260,14 @@ def _fit(
 ) -> Float[np.ndarray, "3"]:
     """Fit A, L and χ to eigenvalues whose largest is 1, with n further terms; L is 0 without boundary."""
     times = np.geomspace(*window, N_TIMES)
-    traces = _weights(np.sqrt(values), ramp) @ exponential_decay(values, times)
+    traces = _weights(np.sqrt(values), ramp) @ np.exp(-np.outer(values, times))
     # ∫ weight exp(-tλ) of the densities of eigenvalues 1 and 1/√λ, in √λ = v: dλ = 2v dv.
     ends = np.array([0, ramp, 1])
     nodes, shares = np.polynomial.legendre.leggauss(N_NODES)
     middles, halves = (ends[1:] + ends[:-1]) / 2, np.diff(ends) / 2
     v = (middles[:, None] + halves[:, None] * nodes).ravel()
     density = 2 * (halves[:, None] * shares).ravel() * _weights(v, ramp)
-    decay = exponential_decay(v**2, times).T
+    decay = np.exp(-np.outer(v**2, times)).T
     columns = [decay @ (density * v) / (4 * np.pi), np.full(N_TIMES, 1 / 6)]
     if boundary is not None:
         sign = 1 if boundary == "neumann" else -1

@@ -11,7 +11,7 @@ from certeig.kit.arguments import require_type
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.matrices import ASYMMETRY
 from certeig.kit.threads import one_blas_thread
-from certeig.solver.factor import Factor, factorize, rounding
+from certeig.solver.factor import Factor
 from certeig.solver.pencil import Pencil
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import ShapeLike
@@ -153,7 +153,7 @@ def _mass(laplacian: Laplacian) -> tuple[Law, Pencil]:
 
 def _factor(pencil: Pencil, share: float) -> Factor | None:
     """Factor at a share of trace W / trace B, or within a few per cent of it where a pivot is exactly zero."""
-    tries = (factorize(pencil, nudge * share * pencil.level) for nudge in COUNT_NUDGES)
+    tries = (Factor.at(pencil, nudge * share * pencil.level) for nudge in COUNT_NUDGES)
     return next((factor for factor in tries if factor), None)
 
 
@@ -168,7 +168,7 @@ def _semidefinite(pencil: Pencil) -> Law:
     for share in LADDER.tolist():
         factor = _factor(pencil, -share)
         if factor and factor.count == 0:
-            loss = float((rounding(factor) / pencil.mass_diagonal).max()) / pencil.mass_floor
+            loss = float((factor.rounding() / pencil.mass_diagonal).max()) / pencil.mass_floor
             proved = float(pencil.values_out(np.array([-factor.shift + loss]))[0])
             explanation = f"W + {share:.0e} (trace W / trace B) B has no negative pivot"
             if share > LADDER[0]:

@@ -9,10 +9,11 @@ from certeig.kit.arguments import describe_value
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike
 from eigenshape._arrays import point_functions
-from eigenshape.spectral.maps.functional_map import point_areas, unit_modes, unit_projector
+from eigenshape.spectral.diffusion.decay import decay_factors
+from eigenshape.spectral.maps.functional_map import unit_modes, unit_projector
 from eigenshape.spectral.signatures.heat import default_times
 from eigenshape.spectral.signatures.wave import default_energies, wave_bands
-from eigenshape.spectral.spectrum import Spectrum, decay_factors
+from eigenshape.spectral.spectrum import Spectrum
 
 SIGNATURES = ("waves", "heat")
 N_FUNCTIONS = 20  # of each signature
@@ -38,7 +39,7 @@ def descriptor_functions(
                 f'descriptors must be "waves", "heat" or a pair of arrays; the value is {descriptors!r}.'
             )
         # Signatures, and the kernels from the points of each pair, in the same bands of λ × area
-        areas = [point_areas(shape).sum() for shape in shapes]
+        areas = [shape.point_areas.sum() for shape in shapes]
         both = []
         for shape, area, points in zip(shapes, areas, ends.T, strict=True):
             if descriptors == "waves":
@@ -67,7 +68,7 @@ def descriptor_functions(
         )
     norms = []
     for number, (functions, shape) in enumerate(zip(both, shapes, strict=True)):
-        shares = point_areas(shape) / point_areas(shape).sum()
+        shares = shape.point_areas / shape.point_areas.sum()
         largest = np.abs(functions).max(axis=0)
         scaled = functions / np.where(largest > 0, largest, 1)
         both[number] = scaled - shares @ scaled

@@ -9,7 +9,7 @@ from certeig.kit.errors import InvalidParameterError
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike, Integer
 from eigenshape._arrays import point_functions
-from eigenshape.spectral.spectrum import Spectrum, count_zero_modes
+from eigenshape.spectral.spectrum import Spectrum
 
 # Share of the constant function that the first mode may lack. The eigenvectors of the approximate
 # solver lack some of it; with a fixed boundary or in an interval most of it is missing.
@@ -87,13 +87,13 @@ def require_one_constant(spectrum: Spectrum, name: str) -> None:
         raise InvalidParameterError(
             f"A map needs at least 2 modes of each shape; the {name} has 1. Solve for more."
         )
-    if count_zero_modes(spectrum) > 1:
+    if spectrum.n_zero_modes > 1:
         raise InvalidParameterError(
             f"Shapes to be mapped must be connected; the {name} has the eigenvalues {spectrum.eigenvalues[0]:.3g} and "
             f"{spectrum.eigenvalues[1]:.3g}, which count as 0, so it has several components. "
             'Use es.repair(mesh, ["largest_component"]).'
         )
-    areas = point_areas(spectrum)
+    areas = spectrum.point_areas
     lost = 1 - (spectrum.eigenvectors[:, 0] @ areas) ** 2 / areas.sum()
     if lost > LOST:
         raise InvalidParameterError(
@@ -117,19 +117,14 @@ def modes_of_both(source: Spectrum, target: Spectrum, n_modes: Integer) -> int:
     )
 
 
-def point_areas(spectrum: Spectrum) -> Float[np.ndarray, " n"]:
-    """Return the area around each point, the row sums of B."""
-    return spectrum.mass.sum(axis=1)
-
-
 def unit_modes(spectrum: Spectrum, k: int) -> Float[np.ndarray, "n k"]:
     """Return the k lowest modes of the shape scaled to area 1: φ_i √A."""
-    return spectrum.eigenvectors[:, :k] * np.sqrt(point_areas(spectrum).sum())
+    return spectrum.eigenvectors[:, :k] * np.sqrt(spectrum.point_areas.sum())
 
 
 def unit_projector(spectrum: Spectrum, k: int) -> Float[np.ndarray, "n k"]:
     """Return B φ_i / √A, whose transpose gives the coefficients of a function in `unit_modes`."""
-    return spectrum.mass @ unit_modes(spectrum, k) / point_areas(spectrum).sum()
+    return spectrum.mass @ unit_modes(spectrum, k) / spectrum.point_areas.sum()
 
 
 @one_blas_thread()

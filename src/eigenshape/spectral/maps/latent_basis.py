@@ -16,7 +16,7 @@ from certeig.kit.memory import require_memory
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike, Integer
 from eigenshape._arrays import finite_rows
-from eigenshape.spectral.maps.functional_map import LOST, FunctionalMap, point_areas, unit_modes
+from eigenshape.spectral.maps.functional_map import LOST, FunctionalMap, unit_modes
 from eigenshape.spectral.spectrum import Spectrum
 
 Kind = Literal["area", "conformal"]  # of shape differences
@@ -275,7 +275,7 @@ def _require_constant(mapping: FunctionalMap, name: str) -> None:
 
 def _unit_values(spectrum: Spectrum, k: int) -> Float[np.ndarray, " k"]:
     """Return the k lowest eigenvalues of a shape scaled to area 1."""
-    return spectrum.eigenvalues[:k] * point_areas(spectrum).sum()
+    return spectrum.eigenvalues[:k] * spectrum.point_areas.sum()
 
 
 def shape_difference(mapping: FunctionalMap, kind: str = "area") -> Float[np.ndarray, "k1 k1"]:

@@ -22,7 +22,6 @@ from eigenshape.spectral.maps.descriptors import (
 from eigenshape.spectral.maps.functional_map import (
     FunctionalMap,
     modes_of_both,
-    point_areas,
     unit_modes,
     unit_projector,
 )
@@ -188,7 +187,7 @@ def functional_map(  # noqa: PLR0913 - what is given, and the weight of each ter
             turns_there = orientation_operators(target, two, faces[1], k)
             terms.append((weights[2], turns, turns_there))
     # λ'_i - λ_j, relative to the largest eigenvalue
-    low, low_there = (each.eigenvalues[:k] * point_areas(each).sum() for each in (source, target))
+    low, low_there = (each.eigenvalues[:k] * each.point_areas.sum() for each in (source, target))
     commutators = (low_there[:, None] - low) / max(low[-1], low_there[-1])
     penalties = weights[0] * commutators**2
     if not terms:

@@ -16,7 +16,6 @@ from certeig.kit.typing import ArrayLike, Integer
 from eigenshape.spectral.maps.functional_map import (
     FunctionalMap,
     modes_of_both,
-    point_areas,
     unit_modes,
     unit_projector,
 )
@@ -264,7 +263,7 @@ def _samples(
     spectrum: Spectrum, count: int, k: int
 ) -> tuple[Float[np.ndarray, "s k"], sp.csr_array]:
     """Return the modes of vertices spread over a shape, and weights of area that sum to 1."""
-    modes, areas = unit_modes(spectrum, k), point_areas(spectrum)
+    modes, areas = unit_modes(spectrum, k), spectrum.point_areas
     if count == len(modes):
         return modes, spectrum.mass / areas.sum()
     # Choose vertices one by one, each farthest from those before in φ/√λ, and note which of them

@@ -14,7 +14,7 @@ from certeig.kit.memory import require_memory
 from certeig.kit.progress import Progress, silent
 from certeig.solver.certify import require_orthonormal
 from certeig.solver.eigenpairs import Pairs
-from certeig.solver.pencil import Pencil, as_pencil, residual_norms
+from certeig.solver.pencil import Pencil
 from certeig.solver.shift import factorize_near
 from certeig.solver.strategy import solve_lowest
 from eigenshape.operators.laplacian import Laplacian
@@ -106,7 +106,7 @@ def approximate_pairs(
     vectors = np.empty((pencil.n, k))
     vectors[start.order] = columns
 
-    pairs = Pairs(values, vectors, residual_norms(pencil, values, vectors))
+    pairs = Pairs(values, vectors, pencil.residual_norms(values, vectors))
     worst, last = float(pairs.residuals.max()), float(values[-1])
     return pairs, Certificate(
         n_pairs=k,
@@ -201,7 +201,7 @@ def _reorder(matrix: sp.sparray, order: Int[np.ndarray, " n"]) -> sp.csr_array:
 def _solve_coarsest(
     stiffness: sp.csr_array, mass: sp.csr_array, k: int, m: int
 ) -> tuple[Coarsest, Float[np.ndarray, " m"]]:
-    pencil = as_pencil(stiffness, mass, ADVICE)
+    pencil = Pencil.unscaled(stiffness, mass, ADVICE)
     pairs, _ = solve_lowest(pencil, m, silent)
     # The mean eigenvalue if all wanted ones are 0.
     last = max(float(pairs.values[k - 1]), pencil.level / pencil.n)

@@ -11,6 +11,7 @@ from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike, Integer
 from certeig.solver.pencil import Pencil
 from eigenshape.operators.laplacian import GaussianKernel, Laplacian
+from eigenshape.spectral.diffusion.decay import exponential_decay
 from eigenshape.spectral.kernel_values import from_pencil, require_readable
 from eigenshape.spectral.multilevel.approximate import (
     MOST_ROUNDS,
@@ -33,7 +34,6 @@ from eigenshape.spectral.multilevel.vcycle import correct
 from eigenshape.spectral.pencils import normalize
 from eigenshape.spectral.signatures.heat import heat_kernel_signature
 from eigenshape.spectral.solve import solve_spectrum
-from eigenshape.spectral.spectrum import exponential_decay
 
 LARGE = 100_000  # points beyond which the command line computes approximate signatures
 USUAL_ACCURACY = 1e-2  # of eigenvalues; the heat then has a relative error of about 1e-3

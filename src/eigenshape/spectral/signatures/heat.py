@@ -8,7 +8,8 @@ from certeig.kit.arrays import positive_values, whole_number
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike, Integer
-from eigenshape.spectral.spectrum import Spectrum, count_zero_modes, decay_factors
+from eigenshape.spectral.diffusion.decay import decay_factors
+from eigenshape.spectral.spectrum import Spectrum
 
 # Relative difference between steps of log t up to which times count as a geometric sequence; the
 # rounding of numpy.geomspace stays far below it.
@@ -23,7 +24,7 @@ def positive_eigenvalues(spectrum: Spectrum) -> Float[np.ndarray, " k"]:
     Raise InvalidParameterError if no eigenvalue is above 0.
     """
     values = spectrum.eigenvalues
-    positive = values[count_zero_modes(spectrum) :]
+    positive = values[spectrum.n_zero_modes :]
     if not positive.size:
         raise InvalidParameterError(
             f"The spectrum must have an eigenvalue above 0; its {len(values)} are all 0, one for each "

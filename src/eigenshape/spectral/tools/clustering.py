@@ -12,8 +12,10 @@ from certeig.kit.arrays import as_array, whole_number
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike
-from eigenshape.operators.laplacian import Laplacian, require_matrix
-from eigenshape.spectral.spectrum import Spectrum, require_lowest
+from eigenshape.operators.laplacian import Laplacian
+from eigenshape.operators.requirements import require_matrix
+from eigenshape.spectral.requirements import require_lowest
+from eigenshape.spectral.spectrum import Spectrum
 from eigenshape.spectral.tools.embedding import count_constant_modes
 
 ClusterMethod = Literal["k-means", "normalized-cut"]

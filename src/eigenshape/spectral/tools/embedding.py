@@ -18,12 +18,9 @@ from certeig.kit.errors import InvalidParameterError
 from certeig.kit.memory import require_memory
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike
-from eigenshape.spectral.spectrum import (
-    Spectrum,
-    count_zero_modes,
-    exponential_decay,
-    require_lowest,
-)
+from eigenshape.spectral.diffusion.decay import exponential_decay
+from eigenshape.spectral.requirements import require_lowest
+from eigenshape.spectral.spectrum import Spectrum
 
 DistanceMethod = Literal["biharmonic", "commute-time", "diffusion"]
 # Cosine of the angle between rows of the constant modes above which two points are of one
@@ -230,7 +227,7 @@ def count_constant_modes(spectrum: Spectrum) -> int:
     """
     require_lowest(spectrum, "spectrum")
     values = spectrum.eigenvalues
-    n_zero = count_zero_modes(spectrum)
+    n_zero = spectrum.n_zero_modes
     # A lone eigenvalue of rounding size is not below its own multiple.
     if n_zero == len(values) or len(values) == 1:
         raise InvalidParameterError(
