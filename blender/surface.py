@@ -1,11 +1,10 @@
 """The mesh of an object as triangles in world coordinates, and values back on its own vertices."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
-from scipy.sparse import eye_array
 from scipy.spatial import cKDTree
 
 import eigenshape as es
@@ -123,10 +122,9 @@ class Surface:
             )
         coordinates = np.empty((len(layer.uv), 2), np.float32)
         layer.uv.foreach_get("vector", coordinates.ravel())
-        none = np.full(self.triangles.n_faces, -1)
-        corners = eye_array(3 * len(none), format="csr")
         texture = coordinates[self.loops].astype(float)
-        worn = es.io.MeshAttributes(self.triangles, corners, none + 1, none, none, texture)
+        plain = es.io.MeshAttributes.plain(self.triangles)
+        worn = replace(plain, texture_coordinates=texture)
         return es.io.carry_attributes(worn, self.mesh)
 
     def write_texture(self, name: str, worn: es.io.MeshAttributes) -> None:

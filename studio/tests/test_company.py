@@ -13,7 +13,7 @@ from test_workspace import Page, file_of
 
 import eigenshape as es
 from certeig.kit.files import content_digest
-from eigenshape.collections.parts import kept_fits, write_state
+from eigenshape.collections.parts import read_fits, write_state
 from eigenshape.matching.spectral_refinement import corners_of_faces
 from eigenshape_studio.calls import RequestError
 from eigenshape_studio.opening import open_workspace
@@ -327,7 +327,7 @@ def collection(tmp_path_factory):
         row = {"name": name, "key": name, "source": str(source), "digest": content_digest(source)}
         rows.append(row | {"notes": made.notes[name]})
     facts = {"template": made.template, "specimens": rows, "failures": made.failures}
-    kept_fits(folder)
+    read_fits(folder)
     write_state(folder, facts, made.mean, fits, made.names)
     return folder
 

@@ -14,7 +14,7 @@ from specimens import make_specimen, mirror, move
 import eigenshape as es
 from eigenshape import _sealed
 from eigenshape.collections import alignment, building, surface_fit
-from eigenshape.collections.parts import kept_fits
+from eigenshape.collections.parts import read_fits
 
 
 def spoil(folder, query):
@@ -149,7 +149,7 @@ def test_what_is_no_collection_is_said(tmp_path, built):
     (tmp_path / "collection.json").write_text("{}")
     with pytest.raises(es.StoreError, match=r"of an earlier version .* Build it again in the same"):
         es.collections.open_collection(tmp_path)
-    kept_fits(tmp_path)
+    read_fits(tmp_path)
     with pytest.raises(es.StoreError, match=r"in the folder; the build in .* was stopped"):
         es.collections.open_collection(tmp_path)
     spoil(tmp_path, "PRAGMA user_version = 9")
@@ -157,6 +157,16 @@ def test_what_is_no_collection_is_said(tmp_path, built):
         es.collections.open_collection(tmp_path)
     with pytest.raises(es.InvalidParameterError, match="must be that of a specimen of the coll"):
         built.read_specimen("broken")
+
+
+def test_a_specimen_is_placed_on_its_own_points_where_it_is(built):
+    own = built.unreflected[built.number("ball 1")]
+    placed = built.read_placed("ball 1", 2 * own + 1)
+    surface = built.read_specimen("ball 1")
+    assert not built.reflected[built.number("ball 1")]
+    np.testing.assert_allclose(placed.vertices, 2 * surface.vertices + 1, atol=1e-9)
+    with pytest.raises(es.InvalidShapeError, match=r"must hold one row for each of .*; it holds 3"):
+        built.read_placed("ball 1", own[:3])
 
 
 @pytest.fixture(scope="module")

@@ -38,7 +38,7 @@ import scipy.sparse as sp
 
 import eigenshape as es
 from eigenshape.geometry.resolution import thinning
-from eigenshape.io.attributes import plain_attributes
+from eigenshape.io.attributes import MeshAttributes
 from eigenshape.retrieval.search import coarse
 from eigenshape.spectral.multilevel import approximate as multilevel
 
@@ -230,7 +230,7 @@ def functional() -> Any:
 def carried() -> Any:
     ball = es.icosphere(3)
     colors = np.random.default_rng(6).integers(0, 256, size=(ball.n_faces, 3, 4)).astype(np.uint8)
-    attributes = replace(plain_attributes(ball), colors=colors)
+    attributes = replace(MeshAttributes.plain(ball), colors=colors)
     return es.io.carry_attributes(attributes, es.icosphere(2)).colors
 
 

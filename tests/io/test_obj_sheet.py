@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from eigenshape import FileFormatError, TriangleMesh, read_mesh, write_mesh
 from eigenshape.geometry.polygons import cut_polygons
 from eigenshape.geometry.repairs.repair import REPAIRS, repair
-from eigenshape.io.attributes import plain_attributes
+from eigenshape.io.attributes import MeshAttributes
 from eigenshape.io.carrying import carry_attributes
 from eigenshape.io.formats.obj import parse, read_sheet
 from eigenshape.io.formats.obj_attributes import format_sheet
@@ -46,7 +46,7 @@ L_SHAPE = [(0, 0), (3, 0), (3, 1), (1, 1), (1, 3), (0, 3)]
 
 
 def rewrite(data, mesh, moved=None):
-    read = plain_attributes(TriangleMesh(*parse(data)))
+    read = MeshAttributes.plain(TriangleMesh(*parse(data)))
     written = mesh if moved is None else TriangleMesh(moved, mesh.faces)
     return format_sheet(read_sheet(data), carry_attributes(read, mesh), written)
 

@@ -34,7 +34,7 @@ from eigenshape.collections.parts import (
     SPECIMENS,
     exporting,
     keep_fit,
-    kept_fits,
+    read_fits,
     write_state,
 )
 from eigenshape.collections.sides import sides_of_landmarks
@@ -282,7 +282,7 @@ class _Run:
         self.callback = callback or _ignore
         self.n_items, self.n_done, self.n_rounds = n_items, 0, 0
         self.failures: dict[str, str] = {}
-        self.kept, self.template = kept_fits(folder)
+        self.kept, self.template = read_fits(folder)
         self.keys: dict[str, str] = {}  # of the last fit of each specimen
         self.used: set[str] = set()  # keys of all fits of this run
 

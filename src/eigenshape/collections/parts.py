@@ -40,7 +40,7 @@ COLLECTION = _sealed.Kind(
 )
 
 
-def kept_fits(folder: Path) -> tuple[dict[str, SurfaceFit], str | None]:
+def read_fits(folder: Path) -> tuple[dict[str, SurfaceFit], str | None]:
     """Return all fits that a folder keeps, by key, and the template of its finished state.
 
     The file is made if it is missing, and mended if it is damaged.

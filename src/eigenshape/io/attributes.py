@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 from scipy.sparse import csr_array, eye_array
 
+from certeig.kit.arguments import require_type
 from certeig.kit.arrays import ReadOnly, record
 from certeig.kit.text import html_repr
 from eigenshape._arrays import number_places
@@ -110,6 +111,24 @@ class MeshAttributes(ReadOnly):
     source: SourceFile | None = None
     places: Float[np.ndarray, "n 3"] | None = None
 
+    @classmethod
+    def plain(cls, mesh: TriangleMesh) -> "MeshAttributes":
+        """Return the attributes of a mesh of which nothing but positions and faces is known.
+
+        Parameters
+        ----------
+        mesh : TriangleMesh
+
+        Returns
+        -------
+        MeshAttributes
+            Every corner of the file is that of a face. `dataclasses.replace` adds to them.
+        """
+        require_type(mesh, TriangleMesh, "mesh")
+        none = np.full(mesh.n_faces, -1)
+        corners = eye_array(3 * mesh.n_faces, format="csr")
+        return cls(mesh, corners, none + 1, none, none)
+
     @property
     def from_file(self) -> Bool[np.ndarray, " f"]:
         """Whether each face is one of the file: each of its corners is one of the same face."""
@@ -149,13 +168,6 @@ class WriteJob:
         contents = self.attributes.contents
         self.lost.extend(other for other in self.attributes.others if other not in kept)
         self.lost.extend(kind for kind in kinds if contents[kind])
-
-
-def plain_attributes(mesh: TriangleMesh) -> MeshAttributes:
-    """Return the attributes of a mesh of which nothing but positions and faces is known."""
-    none = np.full(mesh.n_faces, -1)
-    corners = eye_array(3 * mesh.n_faces, format="csr")
-    return MeshAttributes(mesh, corners, none + 1, none, none)
 
 
 def label_attributes(

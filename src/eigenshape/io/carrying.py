@@ -15,7 +15,7 @@ from eigenshape.geometry.distances.closest import closest_points
 from eigenshape.geometry.distances.closest_loops import nearest_around
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import disjoint_union, join_places
-from eigenshape.io.attributes import MeshAttributes, plain_attributes
+from eigenshape.io.attributes import MeshAttributes
 
 # Faces are searched this many times as far from the middle of a new face as its corners are.
 REACH = 1.5
@@ -99,7 +99,7 @@ def wear_attributes(
     # jump to another limb, and it crosses seams.
     nearest = np.linalg.norm(wanted - middles, axis=2).argmin(axis=1)
     starts = faces[mesh.faces][np.arange(mesh.n_faces), nearest]
-    across = _neighbors(plain_attributes(old), numbers)
+    across = _neighbors(MeshAttributes.plain(old), numbers)
     starts = _corner_places(old, np.repeat(middles, 3, axis=1), starts, across)[0][:, 0].copy()
     found = _corner_places(old, wanted, starts, _neighbors(attributes, numbers))
     matrix = _corner_matrix(*found, old)

@@ -15,7 +15,7 @@ from certeig.kit.typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import Mesh
-from eigenshape.io.attributes import MeshAttributes, plain_attributes
+from eigenshape.io.attributes import MeshAttributes
 from eigenshape.io.formats.registry import (
     FIELD_FORMATS,
     MAP_FORMATS,
@@ -211,4 +211,4 @@ def read_field_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttribu
         if len(values) in (mesh.n_vertices, mesh.n_faces)
     }
     others = tuple(f"the field {name!r}" for name in fields if name not in fitting)
-    return replace(plain_attributes(mesh), fields=fitting, others=others, source=source)
+    return replace(MeshAttributes.plain(mesh), fields=fitting, others=others, source=source)

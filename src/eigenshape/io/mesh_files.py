@@ -15,12 +15,7 @@ from eigenshape._errors import PLURALS, InvalidShapeError, count_nouns
 from eigenshape._typing import FileLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.attributes import (
-    MeshAttributes,
-    WriteJob,
-    label_attributes,
-    plain_attributes,
-)
+from eigenshape.io.attributes import MeshAttributes, WriteJob, label_attributes
 from eigenshape.io.carrying import carry_attributes
 from eigenshape.io.formats.cells import SEGMENTS, require_kind, select_cells, split_sentence
 from eigenshape.io.formats.registry import (
@@ -236,7 +231,7 @@ def require_finite(
 def _read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
     module = format_of(source.suffix).load_attributes()
     if module is None:
-        return plain_attributes(mesh)
+        return MeshAttributes.plain(mesh)
     attributes: MeshAttributes = module.read_attributes(source, mesh)
     return attributes
 
@@ -349,7 +344,7 @@ def save_mesh(
     """Write a mesh as `write_mesh` does, and return a sentence that names what is lost, or none."""
     suffix = suffix_to_write(path, WRITTEN)
     known = format_of(suffix)
-    held = attributes or plain_attributes(mesh)
+    held = attributes or MeshAttributes.plain(mesh)
     if not np.array_equal(held.mesh.faces, mesh.faces):
         raise InvalidParameterError(
             f"attributes must belong to the {mesh.n_faces} faces of the mesh; they belong to {held.mesh.n_faces} "

@@ -22,7 +22,6 @@ from eigenshape.io.attributes import (
     WriteJob,
     corner_normals,
     linear_colors,
-    plain_attributes,
     screen_colors,
 )
 from eigenshape.io.carrying import interpolate
@@ -117,7 +116,7 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
         for node, place in scene.placements.items()
     ]
     return replace(
-        plain_attributes(mesh),
+        MeshAttributes.plain(mesh),
         face_parts=face_parts,
         face_materials=face_materials,
         face_groups=face_groups,

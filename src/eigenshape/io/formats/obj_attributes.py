@@ -15,13 +15,7 @@ from certeig.kit.files import read_regular
 from eigenshape._vectors import area_vectors, unit_vectors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.polygons import cut_polygons
-from eigenshape.io.attributes import (
-    Material,
-    MeshAttributes,
-    WriteJob,
-    corner_normals,
-    plain_attributes,
-)
+from eigenshape.io.attributes import Material, MeshAttributes, WriteJob, corner_normals
 from eigenshape.io.formats.numbers import end_lines, rows_text
 from eigenshape.io.formats.obj import ObjSheet, read_sheet
 from eigenshape.io.opening import SourceFile
@@ -55,7 +49,7 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
     others += sheet.dropped
     has_normals = (normals >= 0).any()
     return replace(
-        plain_attributes(mesh),
+        MeshAttributes.plain(mesh),
         face_materials=face_materials[polygon_of],
         face_groups=face_groups[polygon_of],
         texture_coordinates=coordinates[textures - 1] if textures.any() else None,

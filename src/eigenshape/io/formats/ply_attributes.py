@@ -13,13 +13,7 @@ from certeig.kit.errors import FileFormatError
 from certeig.kit.files import read_regular
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.polygons import triangulate_polygons
-from eigenshape.io.attributes import (
-    Material,
-    MeshAttributes,
-    WriteJob,
-    corner_normals,
-    plain_attributes,
-)
+from eigenshape.io.attributes import Material, MeshAttributes, WriteJob, corner_normals
 from eigenshape.io.formats.cells import list_corners
 from eigenshape.io.formats.obj_attributes import add_image, find_beside
 from eigenshape.io.formats.ply import (
@@ -105,7 +99,7 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
     if materials:
         found |= {"materials": materials, "face_materials": np.zeros(mesh.n_faces, dtype=np.int64)}
     others += missing
-    return replace(plain_attributes(mesh), fields=fields, others=tuple(others), **found)
+    return replace(MeshAttributes.plain(mesh), fields=fields, others=tuple(others), **found)
 
 
 def _read_images(source: SourceFile, end: int) -> tuple[tuple[Material, ...], list[str]]:

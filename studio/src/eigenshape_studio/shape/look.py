@@ -1,10 +1,9 @@
 """How a file says that a shape looks: the image, the colors of its materials and of its corners."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.sparse import eye_array
 
 import eigenshape as es
 
@@ -85,14 +84,10 @@ def unpack_look(
     mesh: es.TriangleMesh, materials: list[dict[str, Any]], arrays: Arrays
 ) -> es.io.MeshAttributes:
     """Return what `pack_look` was given, as far as it says how the shape looks."""
-    f = mesh.n_faces
     images = [arrays.get(f"image {number}") for number in range(len(materials))]
-    return es.io.MeshAttributes(
-        mesh,
-        eye_array(3 * f, format="csr"),
-        np.zeros(f, dtype=np.int64),
-        arrays["face_materials"].astype(np.int64),
-        np.full(f, -1),
+    return replace(
+        es.io.MeshAttributes.plain(mesh),
+        face_materials=arrays["face_materials"].astype(np.int64),
         texture_coordinates=arrays.get("places"),
         colors=arrays.get("colors"),
         materials=tuple(

@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.attributes import MeshAttributes, WriteJob, plain_attributes
+from eigenshape.io.attributes import MeshAttributes, WriteJob
 from eigenshape.io.formats.neuro.freesurfer import footer_of, format_binary
 from eigenshape.io.opening import SourceFile
 
@@ -14,7 +14,7 @@ VOLUME = "the place of the volume of FreeSurfer (c_ras)"
 def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
     """Name what follows the triangles."""
     others = (VOLUME,) if footer_of(source.data) else ()
-    return replace(plain_attributes(mesh), others=others, source=source)
+    return replace(MeshAttributes.plain(mesh), others=others, source=source)
 
 
 def write(job: WriteJob) -> dict[Path, bytes]:
