@@ -33,7 +33,7 @@ def pencil_from_zero(stiffness: sp.csr_array, mass: sp.csr_array) -> Pencil:
 
     The origin is 0 if that holds for W itself.
 
-    Raises an InvalidParameterError as `normalize` does, or if eigenvalues are beyond the range of
+    Raises an InvalidParameterError as `Pencil.scaled` does, or if eigenvalues are beyond the range of
     floats.
     """
     pencil = Pencil.scaled(stiffness, mass)
