@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape.matching.match_loops import nearest_rows
+from eigenshape.matching.match_loops import nearest_rows, support_extensions
 from eigenshape.matching.pairs import Pairs, couplings
 from eigenshape.matching.surface import Surface
 
@@ -51,9 +51,7 @@ def assign_far_points(
     count = len(firsts)
     points = np.repeat(far, count)
     coupling = couplings(part, whole, points, partners.ravel(), FAR_SLACK)
-    # Rows of the candidates of one point: how one candidate supports them, and they support it
-    for_others = coupling.reshape(-1, len(far), count)
-    by_others = np.ascontiguousarray(coupling.T).reshape(-1, len(far), count)
+    transposed = np.ascontiguousarray(coupling.T)
     unlike = UNLIKE * np.log(np.maximum(costs[points, partners.ravel()], LEAST_COST))
     region = whole.between[partners.ravel(), :N_REGIONS].argmin(axis=1)
 
@@ -64,9 +62,8 @@ def assign_far_points(
     cost, kind = unlike[:count], np.zeros(count, dtype=np.int64)
     for step in range(1, len(far)):
         new = np.arange(step * count, (step + 1) * count)
-        for_old = for_others[chosen, step]
-        for_new = by_others[chosen, step].sum(axis=1)
-        support = np.abs(sums[:, :, None] + for_old).sum(axis=1) + np.abs(for_new)
+        support = np.empty((len(chosen), count), dtype=np.float32)
+        support_extensions(chosen, sums, coupling, transposed, step * count, support)
         costs_now = cost[:, None] + unlike[new]
         worth = support / step - costs_now
         if step == 1:
@@ -80,8 +77,10 @@ def assign_far_points(
             kept = _best_of_kinds(worth[old, one], kind[old])[:BEAM_WIDTH]
             old, one = old[kept], one[kept]
             kinds = kind[old]
-        sums = np.hstack([sums[old] + for_old[old, :, one], for_new[old, one][:, None]])
-        chosen = np.hstack([chosen[old], new[one][:, None]])
+        before, added = chosen[old], new[one]
+        by_before = coupling[added, before.T].sum(axis=0)
+        sums = np.column_stack([sums[old] + coupling[before, added[:, None]], by_before])
+        chosen = np.column_stack([before, added])
         cost, kind = costs_now[old, one], kinds
     # The first assignments that differ from all that were taken before
     different = np.empty((N_ASSIGNMENTS, len(far)), dtype=np.int64)

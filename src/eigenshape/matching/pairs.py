@@ -24,8 +24,11 @@ SHORTEST = 0.05  # errors of shorter distances are shares of this
 LONGER = 0.5
 LEAST_SUPPORT = 0.3  # of a pair, as a share of the largest, to be selected
 LEAST_AGREEMENT = 0.7  # the same, of the support by selected pairs, as a share of their median
-FIRST_ROUNDS = 30  # of the iteration from all candidates; it is steady after about 20
+FIRST_ROUNDS = 30  # of the iteration from all candidates, at most
 NEXT_ROUNDS = 15  # near the images of the last round
+# The iteration is steady when no support changes by more than so many times the largest: single
+# precision, in which couplings are, has rounding of 3e-7.
+STEADY = 1e-6
 # Rounds in which pairs are cleaned, extended and selected anew. Maps are bent onto the whole
 # afterwards, so that more rounds add little, and more starts more.
 N_GROWTHS = 2
@@ -141,7 +144,9 @@ def select_pairs(
         length = np.linalg.norm(found)
         if length == 0:
             break
-        support = found / length
+        before, support = support, found / length
+        if np.abs(support - before).max() <= STEADY * support.max():
+            break
     order = np.argsort(-support, kind="stable")
     order = order[support[order] > LEAST_SUPPORT * support[order[0]]]
     first = np.unique(points[order], return_index=True)[1]
