@@ -24,7 +24,6 @@ N_OTHERS = 2  # maps of other starts that are compared
 # Mean distance of a point of the surface from the nearest vertex, in mean edges
 BETWEEN_VERTICES = 0.35
 LEAST_MISFIT = 1e-4  # a pair of equal shapes has less, which says no more
-OTHER_PLACE = 0.06  # units: 0.05 √area, as in the confidence
 TINY = np.finfo(float).tiny
 # Fitted by experiments/ch7_matching/calibrate.py, which prints how good they are: logistic regression on
 # parts of its tuning half, 52 cuts and scans of cats and horses that a smooth field stretches (22 of them

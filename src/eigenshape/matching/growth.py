@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float
 from certeig.kit.threads import map_in_threads
 from eigenshape.geometry.measure import edge_lengths
 from eigenshape.matching.assignment import N_FAR, assign_far_points
-from eigenshape.matching.evidence import OTHER_PLACE, FittedMap
+from eigenshape.matching.evidence import FittedMap
 from eigenshape.matching.fitting import (
     LARGEST_GAP,
     Fit,
@@ -32,9 +32,9 @@ from eigenshape.matching.pairs import (
 from eigenshape.matching.spectral_refinement import Modes, smooth_places
 from eigenshape.matching.surface import Surface
 from eigenshape.matching.turns import (
-    APART,
     N_STEPS,
     NEARLY_RIGID,
+    OTHER_PLACE,
     Turn,
     is_rigid,
     rolled_turns,
@@ -163,7 +163,7 @@ def _rolled_maps(
         # Where the best map lies already, nearest points only add mistakes, as those of fingers on
         # the next finger. Bones that it rolls are 0.08 away from the best roll, hands 0.03.
         away = np.linalg.norm(start.points - best.fit.points, axis=1)
-        if plan.shares @ away < APART:
+        if plan.shares @ away < OTHER_PLACE:
             continue
         pairs = _grow_again(plan, descriptor_costs(differences), [start.select(plan.part.points)])
         if pairs:
