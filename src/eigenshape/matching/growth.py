@@ -138,8 +138,7 @@ def find_maps(
         # Bending forgives a roll about a long axis, so that starts that are rolled are missing, and
         # another limb, on which a foot bends as well as on its own.
         maps = _best_first(maps + _rolled_maps(plan, differences, maps[0], turn))
-        maps = most_rigid_first(plan, maps)
-        turn = settle_map(plan, maps[0].fit.places)
+        maps, turn = most_rigid_first(plan, maps)
     if is_rigid(plan, turn):
         return [FittedMap(maps[0].pairs, turned_fit(plan, turn)), *maps[1:]], turn
     best = maps[0]
@@ -171,14 +170,18 @@ def _rolled_maps(
     return maps
 
 
-def most_rigid_first(plan: FitPlan, maps: list[FittedMap]) -> list[FittedMap]:
-    """Put first, of maps that fit about as well as the best, one that is much nearer to a turn."""
+def most_rigid_first(plan: FitPlan, maps: list[FittedMap]) -> tuple[list[FittedMap], Turn]:
+    """Put first, of maps that fit about as well as the best, one that is much nearer to a turn.
+
+    Also return the turn in which the first one settles.
+    """
     near = [one for one in maps if one.fit.misfit < ABOUT_AS_GOOD * maps[0].fit.misfit]
-    gaps = [settle_map(plan, one.fit.places).gap for one in near]
+    turns = [settle_map(plan, one.fit.places) for one in near]
+    gaps = [turn.gap for turn in turns]
     chosen = int(np.argmin(gaps))
     if gaps[chosen] > NEARER * gaps[0]:
-        return maps
-    return [maps[chosen], *maps[:chosen], *maps[chosen + 1 :]]
+        return maps, turns[0]
+    return [maps[chosen], *maps[:chosen], *maps[chosen + 1 :]], turns[chosen]
 
 
 def grow_maps(
