@@ -47,13 +47,12 @@ def assign_far_points(
     cell = whole.between[:, :N_PLACES].argmin(axis=1)
     order = np.lexsort((costs[far], np.broadcast_to(cell, (len(far), len(cell)))), axis=1)
     firsts = np.flatnonzero(np.diff(cell[order[0]], prepend=-1))
-    partners = order[:, firsts]
-    count = len(firsts)
+    partners, count = order[:, firsts].ravel(), len(firsts)
     points = np.repeat(far, count)
-    coupling = couplings(part, whole, points, partners.ravel(), FAR_SLACK)
+    coupling = couplings(part, whole, points, partners, FAR_SLACK)
     transposed = np.ascontiguousarray(coupling.T)
-    unlike = UNLIKE * np.log(np.maximum(costs[points, partners.ravel()], LEAST_COST))
-    region = whole.between[partners.ravel(), :N_REGIONS].argmin(axis=1)
+    unlike = UNLIKE * np.log(np.maximum(costs[points, partners], LEAST_COST))
+    region = whole.between[partners, :N_REGIONS].argmin(axis=1)
 
     # Row b of `chosen` holds candidates of the first points, `sums` the support of each by the
     # others, and `kind` the regions of the first two.
@@ -73,7 +72,7 @@ def assign_far_points(
             # No assignment has more than N_ALIKE extensions among the best N_ALIKE of its kind.
             best = nearest_rows(-worth.T, min(N_ALIKE, count))
             one = best.ravel()
-            old = np.repeat(np.arange(len(worth)), len(one) // len(worth))
+            old = np.repeat(np.arange(len(worth)), best.shape[1])
             kept = _best_of_kinds(worth[old, one], kind[old])[:BEAM_WIDTH]
             old, one = old[kept], one[kept]
             kinds = kind[old]
@@ -83,16 +82,15 @@ def assign_far_points(
         chosen = np.column_stack([before, added])
         cost, kind = costs_now[old, one], kinds
     # The first assignments that differ from all that were taken before
-    different = np.empty((N_ASSIGNMENTS, len(far)), dtype=np.int64)
-    n_different = 0
-    for ends in partners.ravel()[chosen]:
-        apart = whole.between[ends, different[:n_different]] > APART
+    ends = partners[chosen]
+    different = [ends[0]]
+    for other in ends[1:]:
+        apart = whole.between[other, different] > APART
         if (apart.mean(axis=1) > DIFFERENT).all():
-            different[n_different] = ends
-            n_different += 1
-            if n_different == N_ASSIGNMENTS:
+            different.append(other)
+            if len(different) == N_ASSIGNMENTS:
                 break
-    return [Pairs(far, ends, np.ones(len(far))) for ends in different[:n_different]]
+    return [Pairs(far, taken, np.ones(len(far))) for taken in different]
 
 
 def _best_of_kinds(

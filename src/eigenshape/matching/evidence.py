@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 from scipy.special import expit
 
 from certeig.kit.arrays import record
-from eigenshape._vectors import area_vectors, triangle_areas
+from eigenshape._vectors import area_vectors, triangle_areas, unit_vectors
 from eigenshape.geometry.measure import edge_lengths, face_areas
 from eigenshape.geometry.simplices import at_points
 from eigenshape.geometry.topology import edge_table, neighbor_links
@@ -86,8 +86,7 @@ def signed_area_ratios(
     faces = part.mesh.faces
     areas = triangle_areas(part.mesh.vertices[faces])
     moved = area_vectors(whole.mesh.vertices[places[faces]])
-    normals = whole.normals[places[faces]].sum(axis=1)
-    normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), TINY)
+    normals = unit_vectors(whole.normals[places[faces]].sum(axis=1))
     return np.clip(np.einsum("fi,fi->f", moved, normals) / np.maximum(areas, TINY), -1, 1)
 
 
@@ -134,7 +133,7 @@ def vertex_evidence(
     misfits = place_points(part, whole, pairs, np.arange(n))[1]
     # Local stretch: mean ratio of the lengths of edges, after and before
     edges = edge_table(part.mesh).edges
-    ours = np.linalg.norm(np.subtract(*part.mesh.vertices[edges.T]), axis=1)
+    ours = edge_lengths(part.mesh)
     theirs = np.linalg.norm(np.subtract(*whole.mesh.vertices[places[edges.T]]), axis=1)
     jumps = np.minimum(theirs / np.maximum(ours, TINY), MOST_STRETCH)
     sums = np.bincount(edges.ravel(), weights=np.repeat(jumps, 2), minlength=n)

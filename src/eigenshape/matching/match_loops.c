@@ -72,8 +72,9 @@ KERNEL void couple_pairs(const int64_t *points, const int64_t *images, const str
     }
 }
 
-static float modulus(float real, float imaginary) {
-    return __builtin_sqrtf(real * real + imaginary * imaginary);
+/* Rounded once at the end. */
+static float modulus(double real, double imaginary) {
+    return (float)square_root(real * real + imaginary * imaginary);
 }
 
 /* A block of further pairs at a time, whose sums lie in the frame. */

@@ -133,12 +133,11 @@ def select_pairs(
     also agree in the turn that takes directions on the part to directions on the whole. So pairs of a
     mirror image, whose turns all differ, get little.
     """
-    support = np.full(len(points), 1.0)
-    best = np.empty(points.max() + 1)
+    support = np.ones(len(points))
     for _ in range(rounds):
         found = np.abs(coupling @ support.astype(np.complex64)).astype(np.float64)
         # The candidates of one point compete: each is multiplied by its share of the best.
-        best[:] = np.finfo(float).tiny
+        best = np.full(points.max() + 1, np.finfo(float).tiny)
         np.maximum.at(best, points, found)
         found *= found / best[points]
         length = np.linalg.norm(found)
@@ -166,7 +165,6 @@ def grow_pairs(
     Of a start with a limb on the wrong side, the largest piece that is continuous stays, and the
     limb is placed anew from where it joins that piece.
     """
-    n_points = len(costs)
     for _ in range(N_GROWTHS):
         pairs = _continuous(part, whole, _without_conflicts(part, whole, pairs))
         if len(pairs.points) < FEWEST_PAIRS:
@@ -182,7 +180,7 @@ def grow_pairs(
         partners = nearest_rows(wanted.T, N_NEARBY)
         nearby = np.take_along_axis(moves, partners, axis=1)
         allowed = nearby <= np.maximum(2 * reach, nearby.min(axis=1, keepdims=True))
-        points = np.repeat(np.arange(n_points), allowed.sum(axis=1))
+        points = np.repeat(np.arange(len(costs)), allowed.sum(axis=1))
         partners = partners[allowed]
         coupling = couplings(part, whole, points, partners)
         pairs, _ = select_pairs(coupling, points, partners, NEXT_ROUNDS)

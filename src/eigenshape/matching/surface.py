@@ -7,6 +7,7 @@ import scipy.sparse as sp
 from jaxtyping import Complex64, Float, Float32, Int
 
 from certeig.kit.arrays import ReadOnly, record
+from eigenshape._vectors import unit_vectors
 from eigenshape.geometry.distances.geodesic import farthest_points
 from eigenshape.geometry.measure import mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
@@ -141,8 +142,7 @@ def _directions(
     number = np.repeat(np.arange(len(points)), np.diff(rings.indptr))
     # At each point, two unit vectors that with the normal form a right-handed frame
     upward = normals[points]
-    firsts = np.cross(np.eye(3)[np.abs(upward).argmin(axis=1)], upward)
-    firsts /= np.linalg.norm(firsts, axis=1, keepdims=True)
+    firsts = unit_vectors(np.cross(np.eye(3)[np.abs(upward).argmin(axis=1)], upward))
     frames = np.stack([firsts, np.cross(upward, firsts)], axis=1)
     # Unfold the arms into the tangent planes, with their lengths.
     arms = mesh.vertices[rings.indices] - mesh.vertices[points][number]
