@@ -325,6 +325,9 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "Scaling.carry": lambda v: es.deformation.Scaling([0.1, 0, 0], [2, 1, 0.5]).carry(
         v.ball.vertices, np.linspace(0, 1, v.ball.n_vertices)
     ),
+    "Scaling.stretch": lambda v: es.deformation.Scaling([0.1, 0, 0], [2, 1, 0.5]).stretch(
+        v.ball.vertices, np.linspace(0, 1, v.ball.n_vertices)
+    ),
     "Translation.carry": lambda v: v.move.carry(
         v.ball.vertices, np.linspace(0, 1, v.ball.n_vertices)
     ),

@@ -7,6 +7,7 @@ from eigenshape.matching.match_loops import (
     nearest_face_points,
     nearest_rows,
     place_by_distances,
+    support_extensions,
 )
 
 
@@ -121,3 +122,18 @@ def test_the_nearest_point_may_lie_on_each_side_and_each_corner():
         assert (found == 0).all()
         nearest = weights @ corners[faces[0]]
         np.testing.assert_allclose(nearest[:, :2], list(places.values()), atol=1e-12)
+
+
+def test_support_of_extensions_is_that_of_all_pairs_of_the_longer_set():
+    rng = np.random.default_rng(0)
+    coupling = (rng.normal(size=(330, 330)) + 1j * rng.normal(size=(330, 330))).astype(np.complex64)
+    chosen, count = np.array([[0, 4], [3, 7], [1, 8]]), 300  # more than a block
+    sums = np.array([coupling[np.ix_(each, each)].sum(axis=1) for each in chosen])
+    found = np.empty((3, count), dtype=np.float32)
+    support_extensions(chosen, sums, coupling, np.ascontiguousarray(coupling.T), 20, found)
+    for each, row in zip(chosen, found, strict=True):
+        longer = [coupling[np.ix_([*each, new], [*each, new])] for new in range(20, 320)]
+        for matrix in longer:
+            matrix[2, 2] = 0  # a pair does not support itself
+        wanted = [np.abs(matrix.sum(axis=1)).sum() for matrix in longer]
+        np.testing.assert_allclose(row, wanted, rtol=1e-5)

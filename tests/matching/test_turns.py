@@ -74,7 +74,9 @@ def test_of_maps_that_bend_as_well_the_one_nearest_to_a_turn_comes_first(misfit,
         FittedMap(pairs, Fit(whole.vertices[places], places, np.zeros(600), each))
         for places, each in ((wrong, 0.01), (np.arange(600), misfit))
     ]
-    assert most_rigid_first(plan, maps)[0] is maps[first]
+    ordered, turn = most_rigid_first(plan, maps)
+    assert ordered[0] is maps[first]
+    assert turn.gap == settle_map(plan, maps[first].fit.places).gap
 
 
 @pytest.mark.long

@@ -9,7 +9,7 @@ from jaxtyping import Float
 from certeig.kit.arguments import require_type
 from certeig.kit.typing import Integer
 from eigenshape.deformation.binding import Binding, bind, pull_binding
-from eigenshape.deformation.handles import Handle, Scaling, require_handle, require_handles
+from eigenshape.deformation.handles import Handle, require_handle, require_handles
 from eigenshape.deformation.modes import Mode, require_mode
 from eigenshape.deformation.region import Region
 from eigenshape.deformation.rig import EigenRig
@@ -158,8 +158,7 @@ def bend_graded(
     # A scaling changes lengths. Edges then stay as rigid as they can beside those of the scaled shape.
     rest = binding.rig.mesh.vertices
     for handle, share in pairs:
-        if isinstance(handle, Scaling):
-            rest = rest + handle.carry(binding.rig.mesh.vertices, share)
+        rest = rest + handle.stretch(binding.rig.mesh.vertices, share)
     return relax(binding.rig.edges, binding.part, rest, start, turns, n_rounds)
 
 

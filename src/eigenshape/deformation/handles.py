@@ -12,8 +12,28 @@ from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike
 
 
+class _Motion(ReadOnly):
+    """A motion that neither turns nor stretches anything, unless a handle says so."""
+
+    @property
+    def turn(self) -> Float[np.ndarray, " 3"]:
+        """Rotation vector: zero."""
+        return np.zeros(3)
+
+    @property
+    def linear(self) -> Float[np.ndarray, "3 3"]:
+        """Linear part of the displacement: zero."""
+        return np.zeros((3, 3))
+
+    def stretch(
+        self, points: Float[np.ndarray, "n 3"], share: Float[np.ndarray, " n"]
+    ) -> Float[np.ndarray, "n 3"]:
+        """Return the displacement by which lengths at rest change: zero for rigid motions."""
+        return np.zeros_like(points)
+
+
 @record
-class Rotation(ReadOnly):
+class Rotation(_Motion):
     """A rotation about an axis through a pivot, by any angle.
 
     Parameters
@@ -70,6 +90,12 @@ class Rotation(ReadOnly):
         """Rotation vector: axis times angle, in radians."""
         return self.axis * self.angle
 
+    @property
+    def linear(self) -> Float[np.ndarray, "3 3"]:
+        """Linear part of the displacement: the rotation matrix less the identity."""
+        # From a rotation about the origin: a distant pivot would cost digits.
+        return Rotation(np.zeros(3), self.axis, self.angle).carry(np.eye(3), np.ones(3)).T
+
     def carry(
         self, points: Float[np.ndarray, "n 3"], share: Float[np.ndarray, " n"]
     ) -> Float[np.ndarray, "n 3"]:
@@ -90,7 +116,7 @@ class Rotation(ReadOnly):
 
 
 @record
-class Translation(ReadOnly):
+class Translation(_Motion):
     """A translation by a vector.
 
     Parameters
@@ -120,11 +146,6 @@ class Translation(ReadOnly):
     def __init__(self, vector: ArrayLike) -> None:
         vars(self).update(vector=freeze(as_vector(vector, "vector")))
 
-    @property
-    def turn(self) -> Float[np.ndarray, " 3"]:
-        """Rotation vector: zero."""
-        return np.zeros(3)
-
     def carry(
         self, points: Float[np.ndarray, "n 3"], share: Float[np.ndarray, " n"]
     ) -> Float[np.ndarray, "n 3"]:
@@ -140,7 +161,7 @@ class Translation(ReadOnly):
 
 
 @record
-class Scaling(ReadOnly):
+class Scaling(_Motion):
     """A scaling about a pivot, by a factor along each axis of the coordinates.
 
     Parameters
@@ -185,9 +206,9 @@ class Scaling(ReadOnly):
         vars(self).update(pivot=freeze(as_vector(pivot, "pivot")), factors=freeze(sizes))
 
     @property
-    def turn(self) -> Float[np.ndarray, " 3"]:
-        """Rotation vector: zero."""
-        return np.zeros(3)
+    def linear(self) -> Float[np.ndarray, "3 3"]:
+        """Linear part of the displacement: the diagonal matrix of the factors less 1."""
+        return np.diag(self.factors - 1)
 
     def carry(
         self, points: Float[np.ndarray, "n 3"], share: Float[np.ndarray, " n"]
@@ -201,6 +222,19 @@ class Scaling(ReadOnly):
             Share of the motion that each point follows, usually 0 to 1.
         """
         return share[:, None] * (self.factors - 1) * (points - self.pivot)
+
+    def stretch(
+        self, points: Float[np.ndarray, "n 3"], share: Float[np.ndarray, " n"]
+    ) -> Float[np.ndarray, "n 3"]:
+        """Return the displacement by which lengths at rest change: the whole of it.
+
+        Parameters
+        ----------
+        points : (n, 3) float
+        share : (n,) float
+            Share of the motion that each point follows, usually 0 to 1.
+        """
+        return self.carry(points, share)
 
 
 # `help` shows the name.
@@ -224,14 +258,7 @@ def require_handles(handles: Sequence[Handle], n_regions: int) -> None:
 
 def affine_offset(handle: Handle) -> Float[np.ndarray, "3 4"]:
     """Return D, for which D [x, 1] is the displacement of x under the whole motion."""
-    shift = handle.carry(np.zeros((1, 3)), np.ones(1))[0]
-    if isinstance(handle, Translation):
-        return np.column_stack([np.zeros((3, 3)), shift])
-    if isinstance(handle, Scaling):
-        return np.column_stack([np.diag(handle.factors - 1), shift])
-    # The linear part, from a rotation about the origin: a distant pivot would cost digits.
-    about_origin = Rotation(np.zeros(3), handle.axis, handle.angle)
-    return np.column_stack([about_origin.carry(np.eye(3), np.ones(3)).T, shift])
+    return np.column_stack([handle.linear, handle.carry(np.zeros((1, 3)), np.ones(1))[0]])
 
 
 def as_vector(value: ArrayLike, name: str) -> Float[np.ndarray, " 3"]:

@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape.matching.match_loops import nearest_rows
+from eigenshape.matching.match_loops import nearest_rows, support_extensions
 from eigenshape.matching.pairs import Pairs, couplings
 from eigenshape.matching.surface import Surface
 
@@ -47,15 +47,12 @@ def assign_far_points(
     cell = whole.between[:, :N_PLACES].argmin(axis=1)
     order = np.lexsort((costs[far], np.broadcast_to(cell, (len(far), len(cell)))), axis=1)
     firsts = np.flatnonzero(np.diff(cell[order[0]], prepend=-1))
-    partners = order[:, firsts]
-    count = len(firsts)
+    partners, count = order[:, firsts].ravel(), len(firsts)
     points = np.repeat(far, count)
-    coupling = couplings(part, whole, points, partners.ravel(), FAR_SLACK)
-    # Rows of the candidates of one point: how one candidate supports them, and they support it
-    for_others = coupling.reshape(-1, len(far), count)
-    by_others = np.ascontiguousarray(coupling.T).reshape(-1, len(far), count)
-    unlike = UNLIKE * np.log(np.maximum(costs[points, partners.ravel()], LEAST_COST))
-    region = whole.between[partners.ravel(), :N_REGIONS].argmin(axis=1)
+    coupling = couplings(part, whole, points, partners, FAR_SLACK)
+    transposed = np.ascontiguousarray(coupling.T)
+    unlike = UNLIKE * np.log(np.maximum(costs[points, partners], LEAST_COST))
+    region = whole.between[partners, :N_REGIONS].argmin(axis=1)
 
     # Row b of `chosen` holds candidates of the first points, `sums` the support of each by the
     # others, and `kind` the regions of the first two.
@@ -64,9 +61,8 @@ def assign_far_points(
     cost, kind = unlike[:count], np.zeros(count, dtype=np.int64)
     for step in range(1, len(far)):
         new = np.arange(step * count, (step + 1) * count)
-        for_old = for_others[chosen, step]
-        for_new = by_others[chosen, step].sum(axis=1)
-        support = np.abs(sums[:, :, None] + for_old).sum(axis=1) + np.abs(for_new)
+        support = np.empty((len(chosen), count), dtype=np.float32)
+        support_extensions(chosen, sums, coupling, transposed, step * count, support)
         costs_now = cost[:, None] + unlike[new]
         worth = support / step - costs_now
         if step == 1:
@@ -76,24 +72,25 @@ def assign_far_points(
             # No assignment has more than N_ALIKE extensions among the best N_ALIKE of its kind.
             best = nearest_rows(-worth.T, min(N_ALIKE, count))
             one = best.ravel()
-            old = np.repeat(np.arange(len(worth)), len(one) // len(worth))
+            old = np.repeat(np.arange(len(worth)), best.shape[1])
             kept = _best_of_kinds(worth[old, one], kind[old])[:BEAM_WIDTH]
             old, one = old[kept], one[kept]
             kinds = kind[old]
-        sums = np.hstack([sums[old] + for_old[old, :, one], for_new[old, one][:, None]])
-        chosen = np.hstack([chosen[old], new[one][:, None]])
+        before, added = chosen[old], new[one]
+        by_before = coupling[added, before.T].sum(axis=0)
+        sums = np.column_stack([sums[old] + coupling[before, added[:, None]], by_before])
+        chosen = np.column_stack([before, added])
         cost, kind = costs_now[old, one], kinds
     # The first assignments that differ from all that were taken before
-    different = np.empty((N_ASSIGNMENTS, len(far)), dtype=np.int64)
-    n_different = 0
-    for ends in partners.ravel()[chosen]:
-        apart = whole.between[ends, different[:n_different]] > APART
+    ends = partners[chosen]
+    different = [ends[0]]
+    for other in ends[1:]:
+        apart = whole.between[other, different] > APART
         if (apart.mean(axis=1) > DIFFERENT).all():
-            different[n_different] = ends
-            n_different += 1
-            if n_different == N_ASSIGNMENTS:
+            different.append(other)
+            if len(different) == N_ASSIGNMENTS:
                 break
-    return [Pairs(far, ends, np.ones(len(far))) for ends in different[:n_different]]
+    return [Pairs(far, taken, np.ones(len(far))) for taken in different]
 
 
 def _best_of_kinds(

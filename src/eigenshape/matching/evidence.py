@@ -10,7 +10,7 @@ from scipy.special import expit
 
 from certeig.kit.arrays import record
 from eigenshape._corners import at_points
-from eigenshape._vectors import area_vectors, triangle_areas
+from eigenshape._vectors import area_vectors, triangle_areas, unit_vectors
 from eigenshape.geometry.measure import edge_lengths, face_areas
 from eigenshape.geometry.topology import edge_table, neighbor_links
 from eigenshape.matching.fitting import Fit
@@ -24,7 +24,6 @@ N_OTHERS = 2  # maps of other starts that are compared
 # Mean distance of a point of the surface from the nearest vertex, in mean edges
 BETWEEN_VERTICES = 0.35
 LEAST_MISFIT = 1e-4  # a pair of equal shapes has less, which says no more
-OTHER_PLACE = 0.06  # units: 0.05 √area, as in the confidence
 TINY = np.finfo(float).tiny
 # Fitted by experiments/ch7_matching/calibrate.py, which prints how good they are: logistic regression on
 # parts of its tuning half, 52 cuts and scans of cats and horses that a smooth field stretches (22 of them
@@ -87,8 +86,7 @@ def signed_area_ratios(
     faces = part.mesh.faces
     areas = triangle_areas(part.mesh.vertices[faces])
     moved = area_vectors(whole.mesh.vertices[places[faces]])
-    normals = whole.normals[places[faces]].sum(axis=1)
-    normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), TINY)
+    normals = unit_vectors(whole.normals[places[faces]].sum(axis=1))
     return np.clip(np.einsum("fi,fi->f", moved, normals) / np.maximum(areas, TINY), -1, 1)
 
 
@@ -135,7 +133,7 @@ def vertex_evidence(
     misfits = place_points(part, whole, pairs, np.arange(n))[1]
     # Local stretch: mean ratio of the lengths of edges, after and before
     edges = edge_table(part.mesh).edges
-    ours = np.linalg.norm(np.subtract(*part.mesh.vertices[edges.T]), axis=1)
+    ours = edge_lengths(part.mesh)
     theirs = np.linalg.norm(np.subtract(*whole.mesh.vertices[places[edges.T]]), axis=1)
     jumps = np.minimum(theirs / np.maximum(ours, TINY), MOST_STRETCH)
     sums = np.bincount(edges.ravel(), weights=np.repeat(jumps, 2), minlength=n)

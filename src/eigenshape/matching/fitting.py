@@ -11,8 +11,7 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
-from scipy.linalg import cho_factor
-from scipy.linalg.lapack import dpotrs
+from scipy.linalg.lapack import dpotrf, dpotrs
 
 from certeig.kit.arrays import record
 from eigenshape._vectors import nearest_rotations
@@ -212,14 +211,14 @@ def _fit(
         # Frames that nothing pulls are held by a little more than 0.
         least = 1e-9 / len(frames)
         fill_stiffness(carriers, portions, pull, plan.graph, stiffness, least, matrix)
-        # The transpose lies in memory as LAPACK wants it, and is overwritten.
-        factor, _ = cho_factor(matrix.T, overwrite_a=True, check_finite=False)
+        # The transpose lies in memory as LAPACK wants it, and is overwritten. LAPACK itself: the
+        # checks of `cho_factor` and `cho_solve` take as long as a solve.
+        factor, _ = dpotrf(matrix.T, overwrite_a=True, clean=False)
         weight = stiffness * 2 / len(plan.one)  # as in `graph`
         for _ in range(N_FIRST if step == 0 else N_NEXT):
             right = np.zeros(places.shape)
             edges = plan.one, plan.two, plan.links, weight
             add_forces(turns, carriers, portions, plan.arms, pull, targets, *edges, right)
-            # LAPACK itself: the checks of `cho_solve` take as long as the solve.
             places = np.ascontiguousarray(dpotrs(factor, right)[0])
             turn_frames(places, plan.one, plan.two, plan.links, *FREE_SIZES, turns)
 

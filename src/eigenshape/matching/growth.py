@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float
 from certeig.kit.threads import map_in_threads
 from eigenshape.geometry.measure import edge_lengths
 from eigenshape.matching.assignment import N_FAR, assign_far_points
-from eigenshape.matching.evidence import OTHER_PLACE, FittedMap
+from eigenshape.matching.evidence import FittedMap
 from eigenshape.matching.fitting import (
     LARGEST_GAP,
     Fit,
@@ -32,9 +32,9 @@ from eigenshape.matching.pairs import (
 from eigenshape.matching.spectral_refinement import Modes, smooth_places
 from eigenshape.matching.surface import Surface
 from eigenshape.matching.turns import (
-    APART,
     N_STEPS,
     NEARLY_RIGID,
+    OTHER_PLACE,
     Turn,
     is_rigid,
     rolled_turns,
@@ -138,8 +138,7 @@ def find_maps(
         # Bending forgives a roll about a long axis, so that starts that are rolled are missing, and
         # another limb, on which a foot bends as well as on its own.
         maps = _best_first(maps + _rolled_maps(plan, differences, maps[0], turn))
-        maps = most_rigid_first(plan, maps)
-        turn = settle_map(plan, maps[0].fit.places)
+        maps, turn = most_rigid_first(plan, maps)
     if is_rigid(plan, turn):
         return [FittedMap(maps[0].pairs, turned_fit(plan, turn)), *maps[1:]], turn
     best = maps[0]
@@ -163,7 +162,7 @@ def _rolled_maps(
         # Where the best map lies already, nearest points only add mistakes, as those of fingers on
         # the next finger. Bones that it rolls are 0.08 away from the best roll, hands 0.03.
         away = np.linalg.norm(start.points - best.fit.points, axis=1)
-        if plan.shares @ away < APART:
+        if plan.shares @ away < OTHER_PLACE:
             continue
         pairs = _grow_again(plan, descriptor_costs(differences), [start.select(plan.part.points)])
         if pairs:
@@ -171,14 +170,18 @@ def _rolled_maps(
     return maps
 
 
-def most_rigid_first(plan: FitPlan, maps: list[FittedMap]) -> list[FittedMap]:
-    """Put first, of maps that fit about as well as the best, one that is much nearer to a turn."""
+def most_rigid_first(plan: FitPlan, maps: list[FittedMap]) -> tuple[list[FittedMap], Turn]:
+    """Put first, of maps that fit about as well as the best, one that is much nearer to a turn.
+
+    Also return the turn in which the first one settles.
+    """
     near = [one for one in maps if one.fit.misfit < ABOUT_AS_GOOD * maps[0].fit.misfit]
-    gaps = [settle_map(plan, one.fit.places).gap for one in near]
+    turns = [settle_map(plan, one.fit.places) for one in near]
+    gaps = [turn.gap for turn in turns]
     chosen = int(np.argmin(gaps))
     if gaps[chosen] > NEARER * gaps[0]:
-        return maps
-    return [maps[chosen], *maps[:chosen], *maps[chosen + 1 :]]
+        return maps, turns[0]
+    return [maps[chosen], *maps[:chosen], *maps[chosen + 1 :]], turns[chosen]
 
 
 def grow_maps(

@@ -72,6 +72,34 @@ KERNEL void couple_pairs(const int64_t *points, const int64_t *images, const str
     }
 }
 
+/* Rounded once at the end. */
+static float modulus(double real, double imaginary) {
+    return (float)square_root(real * real + imaginary * imaginary);
+}
+
+/* A block of further pairs at a time, whose sums lie in the frame. */
+KERNEL void support_extensions(const int64_t *chosen, const complex64_t *sums,
+                               const complex64_t *forth, const complex64_t *back, int64_t first,
+                               float *support, int64_t n_rows, int64_t n_chosen,
+                               int64_t n_candidates, int64_t count) {
+    for (int64_t place = 0; place < n_rows * count;) {
+        int64_t row = place / count, begin = place % count, size = lesser(count - begin, BLOCK);
+        complex64_t by_chosen[BLOCK] = {{0, 0}};
+        float found[BLOCK] = {0};
+        for (int64_t at = row * n_chosen; at < (row + 1) * n_chosen; at++) {
+            int64_t pair = chosen[at] * n_candidates + first + begin;
+            for (int64_t j = 0; j < size; j++) {
+                found[j] += modulus(sums[at].real + forth[pair + j].real,
+                                    sums[at].imaginary + forth[pair + j].imaginary);
+                by_chosen[j].real += back[pair + j].real;
+                by_chosen[j].imaginary += back[pair + j].imaginary;
+            }
+        }
+        for (int64_t j = 0; j < size; j++)
+            support[place++] = found[j] + modulus(by_chosen[j].real, by_chosen[j].imaginary);
+    }
+}
+
 static bool is_finite(double value) { return absolute(value) < INFINITE; }
 
 /* Row by row, as they lie in memory; each column keeps the least entries so far in order. */
@@ -115,6 +143,15 @@ static double misfit_at(int64_t vertex, const struct scratch *near, int64_t n_ne
     return sum;
 }
 
+enum { CHUNK = 16 };
+
+/* Whether one of CHUNK distances lies between two: the computer asks that of all at once. */
+static bool has_between(const float *distances, double low, double high) {
+    bool any = false;
+    for (int64_t w = 0; w < CHUNK; w++) any |= (low <= distances[w]) & (distances[w] <= high);
+    return any;
+}
+
 KERNEL void fill_places(const float *rows, const int64_t *partners, const float *theirs,
                         const int64_t *near, const int64_t *starts, double softness, double cap,
                         double longer, int64_t *found, double *misfits,
@@ -146,9 +183,13 @@ KERNEL void fill_places(const float *rows, const int64_t *partners, const float 
         double low = lengths[0] - 1.0001 * reach / longer, high = lengths[0] + 1.0001 * reach;
         const float *firsts = &theirs[scratch->ends[0] * n_vertices];
         int64_t n_tried = 0;
-        for (int64_t w = 0; w < n_vertices; w++) {
-            tried[n_tried] = w;
-            n_tried += (low <= firsts[w]) & (firsts[w] <= high);
+        for (int64_t begin = 0; begin < n_vertices; begin += CHUNK) {
+            int64_t end = lesser(begin + CHUNK, n_vertices);
+            if (end == begin + CHUNK && !has_between(&firsts[begin], low, high)) continue;
+            for (int64_t w = begin; w < end; w++) {
+                tried[n_tried] = w;
+                n_tried += (low <= firsts[w]) & (firsts[w] <= high);
+            }
         }
         for (int64_t number = 0; number < n_tried; number++) {
             double misfit =

@@ -35,6 +35,23 @@ def couple_pairs(
     """
 
 
+@kernel("n_rows", "n_chosen", "n_candidates", "count")
+def support_extensions(
+    chosen: Int64[np.ndarray, "n_rows n_chosen"],
+    sums: Complex64[np.ndarray, "n_rows n_chosen"],
+    forth: Complex64[np.ndarray, "n_candidates n_candidates"],
+    back: Complex64[np.ndarray, "n_candidates n_candidates"],
+    first: int,
+    support: Out[Float32[np.ndarray, "n_rows count"]],
+) -> None:
+    """Write how well sets of pairs support each other, each with one further pair.
+
+    Row b of `chosen` numbers the pairs of a set, of which `sums` holds the support by the others.
+    The further pairs are `count` ones from `first` on. `forth` holds the couplings of all pairs, and
+    `back` the same transposed.
+    """
+
+
 def nearest_rows(rows: Float[np.ndarray, "m n"], count: int) -> Int64[np.ndarray, "n count"]:
     """Return, for each column of a table, the rows of the least entries, the least first.
 

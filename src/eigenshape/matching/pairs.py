@@ -24,8 +24,11 @@ SHORTEST = 0.05  # errors of shorter distances are shares of this
 LONGER = 0.5
 LEAST_SUPPORT = 0.3  # of a pair, as a share of the largest, to be selected
 LEAST_AGREEMENT = 0.7  # the same, of the support by selected pairs, as a share of their median
-FIRST_ROUNDS = 30  # of the iteration from all candidates; it is steady after about 20
+FIRST_ROUNDS = 30  # of the iteration from all candidates, at most
 NEXT_ROUNDS = 15  # near the images of the last round
+# The iteration is steady when no support changes by more than so many times the largest: single
+# precision, in which couplings are, has rounding of 3e-7.
+STEADY = 1e-6
 # Rounds in which pairs are cleaned, extended and selected anew. Maps are bent onto the whole
 # afterwards, so that more rounds add little, and more starts more.
 N_GROWTHS = 2
@@ -130,18 +133,19 @@ def select_pairs(
     also agree in the turn that takes directions on the part to directions on the whole. So pairs of a
     mirror image, whose turns all differ, get little.
     """
-    support = np.full(len(points), 1.0)
-    best = np.empty(points.max() + 1)
+    support = np.ones(len(points))
     for _ in range(rounds):
         found = np.abs(coupling @ support.astype(np.complex64)).astype(np.float64)
         # The candidates of one point compete: each is multiplied by its share of the best.
-        best[:] = np.finfo(float).tiny
+        best = np.full(points.max() + 1, np.finfo(float).tiny)
         np.maximum.at(best, points, found)
         found *= found / best[points]
         length = np.linalg.norm(found)
         if length == 0:
             break
-        support = found / length
+        before, support = support, found / length
+        if np.abs(support - before).max() <= STEADY * support.max():
+            break
     order = np.argsort(-support, kind="stable")
     order = order[support[order] > LEAST_SUPPORT * support[order[0]]]
     first = np.unique(points[order], return_index=True)[1]
@@ -161,7 +165,6 @@ def grow_pairs(
     Of a start with a limb on the wrong side, the largest piece that is continuous stays, and the
     limb is placed anew from where it joins that piece.
     """
-    n_points = len(costs)
     for _ in range(N_GROWTHS):
         pairs = _continuous(part, whole, _without_conflicts(part, whole, pairs))
         if len(pairs.points) < FEWEST_PAIRS:
@@ -177,7 +180,7 @@ def grow_pairs(
         partners = nearest_rows(wanted.T, N_NEARBY)
         nearby = np.take_along_axis(moves, partners, axis=1)
         allowed = nearby <= np.maximum(2 * reach, nearby.min(axis=1, keepdims=True))
-        points = np.repeat(np.arange(n_points), allowed.sum(axis=1))
+        points = np.repeat(np.arange(len(costs)), allowed.sum(axis=1))
         partners = partners[allowed]
         coupling = couplings(part, whole, points, partners)
         pairs, _ = select_pairs(coupling, points, partners, NEXT_ROUNDS)

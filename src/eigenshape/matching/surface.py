@@ -3,11 +3,12 @@
 from dataclasses import replace
 
 import numpy as np
+import scipy.sparse as sp
 from jaxtyping import Complex64, Float, Float32, Int
 
 from certeig.kit.arrays import ReadOnly, record
-from certeig.kit.threads import map_in_threads
 from eigenshape._corners import mean_normals
+from eigenshape._vectors import unit_vectors
 from eigenshape.geometry.distances.geodesic import farthest_points
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.orientation import orient_outward
@@ -138,29 +139,25 @@ def _directions(
     """
     links = neighbor_links(mesh)
     rings = (links + links @ links)[points].tocsr()
-    columns = np.ascontiguousarray(rows.T)
+    number = np.repeat(np.arange(len(points)), np.diff(rings.indptr))
     # At each point, two unit vectors that with the normal form a right-handed frame
     upward = normals[points]
-    firsts = np.cross(np.eye(3)[np.abs(upward).argmin(axis=1)], upward)
-    firsts /= np.linalg.norm(firsts, axis=1, keepdims=True)
+    firsts = unit_vectors(np.cross(np.eye(3)[np.abs(upward).argmin(axis=1)], upward))
     frames = np.stack([firsts, np.cross(upward, firsts)], axis=1)
-    found = np.empty((len(points),) * 2, dtype=np.complex64)
-
-    def write_directions(number: int) -> None:
-        point = points[number]
-        around = rings.indices[rings.indptr[number] : rings.indptr[number + 1]]
-        around = around[around != point]
-        arms = mesh.vertices[around] - mesh.vertices[point]
-        # Unfold the arms into the tangent plane, with their lengths.
-        flat = arms @ frames[number].T
-        lengths = np.linalg.norm(flat, axis=1)
-        stretch = np.linalg.norm(arms, axis=1) / np.maximum(lengths, np.finfo(float).tiny)
-        flat *= stretch[:, None]
-        with np.errstate(invalid="ignore"):
-            rises = columns[around] - columns[point]
-        rises[~np.isfinite(rises)] = 0.0
-        slopes = np.linalg.lstsq(flat, rises, rcond=None)[0]
-        found[number] = -(slopes[0] + 1j * slopes[1])
-
-    map_in_threads(write_directions, range(len(points)))
+    # Unfold the arms into the tangent planes, with their lengths.
+    arms = mesh.vertices[rings.indices] - mesh.vertices[points][number]
+    flat = np.einsum("eij,ej->ei", frames[number], arms)
+    lengths = np.linalg.norm(flat, axis=1)
+    stretch = np.linalg.norm(arms, axis=1) / np.maximum(lengths, np.finfo(float).tiny)
+    flat *= stretch[:, None]
+    # Least squares by the normal equations of each point, the shortest slope where arms lie on a line
+    grams = np.add.reduceat(flat[:, :, None] * flat[:, None], rings.indptr[:-1])
+    shares = np.einsum("eij,ej->ei", np.linalg.pinv(grams, hermitian=True)[number], flat)
+    columns = np.ascontiguousarray(rows.T)
+    columns[~np.isfinite(columns)] = 0  # other components, which lie in no direction
+    slopes = []
+    for along in np.ascontiguousarray(shares.T):
+        fit = sp.csr_array((along, rings.indices, rings.indptr), shape=rings.shape)
+        slopes.append(fit @ columns - fit.sum(axis=1)[:, None] * columns[points])
+    found = -(slopes[0] + 1j * slopes[1]).astype(np.complex64)
     return found / np.maximum(np.abs(found), 1)

@@ -153,10 +153,8 @@ def describe_views(mesh: TriangleMesh, points: Int[np.ndarray, " m"]) -> tuple[V
     def describe_view(number: int) -> View:
         view = view_of(mesh, number)
         piece, sources = view.mesh, view.source_vertices
-        places = np.full(max(sources.max(), points.max()) + 1, -1)
-        places[sources] = np.arange(piece.n_vertices)
-        seen = np.flatnonzero(places[points] >= 0)
-        chosen = places[points[seen]]
+        seen = np.flatnonzero(np.isin(points, sources))
+        chosen = np.searchsorted(sources, points[seen])  # sources ascend
         rows = unchecked_rows(piece)(chosen, np.arange(1, len(chosen) + 1), MATCHED_RADII[-1])
         normals, areas = mean_normals(piece), dual_volumes(piece)
         numbers = describe_discs(piece, chosen, rows, MATCHED_RADII, normals, areas)

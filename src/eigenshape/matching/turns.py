@@ -22,8 +22,9 @@ N_ROLL_STEPS, N_STEPS = 6, 20
 RIGID = 0.003
 # Mean distance, in units, up to which rolls are tried: two metacarpals have 0.014, two poses of an animal 0.03.
 NEARLY_RIGID = 0.025
-# Two turns differ if they place samples this far apart on average, in units.
-APART = 0.06
+# Places farther apart than this, in units, are different ones: 0.05 √area, as in the confidence. Two turns
+# differ if they place samples so far apart on average.
+OTHER_PLACE = 0.06
 
 
 @record
@@ -106,6 +107,6 @@ def rolled_turns(plan: FitPlan, turn: Turn) -> list[Turn]:
     for one in sorted(found, key=lambda one: one.gap):
         moved = one.move(points)
         away = [np.linalg.norm(moved - other.move(points), axis=1).mean() for other in kept]
-        if min(away, default=np.inf) > APART:
+        if min(away, default=np.inf) > OTHER_PLACE:
             kept.append(one)
     return kept
