@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import sqrt
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import typer
 
@@ -30,6 +30,7 @@ def match(
     whole: Path,
     *,
     scale: str = "auto",
+    overlap: Literal["full", "partial"] = "full",
     repair: str = "auto",
     output: Path | None = None,
     picture: Path | None = None,
@@ -55,6 +56,9 @@ def match(
         a number by which lengths of the part are multiplied. auto takes the root of the ratio of
         areas if both shapes are complete and differ in size, known if not, and unknown if the part
         is too large or too small for that.
+    overlap
+        partial if each of the two shapes has regions that the other one lacks: only the region that
+        both have is mapped.
     output
         Write the map: a table with face, weights and confidence of each vertex of the part (CSV),
         the same as arrays (NPZ), or the nearest vertex of the whole, one a line, as `stability
@@ -74,9 +78,13 @@ def match(
             ) from error
     ours, theirs = (steps.load_surface(path, repair) for path in (mesh, whole))
     with progress_bar("match") as progress:
-        found = es.match_shapes(ours, theirs, scale=size, progress=progress)
+        found = es.match_shapes(
+            ours, theirs, scale=size, overlap=overlap, progress=progress
+        )
     if as_json:
         each = {"vertices": found.vertices, "vertex_confidence": found.confidence}
+        if overlap == "partial":
+            each["covered"] = found.covered
         print_json({"path": mesh, "whole": whole, **_match_facts(found), **each})
     else:
         _print_match(found)
@@ -89,6 +97,7 @@ def match(
 def _match_facts(found: es.matching.ShapeMatch) -> dict[str, Any]:
     """Return what a map says of the whole shape, without what it says of each vertex."""
     arrays = ("vertices", "faces", "corners", "weights", "confidence", "evidence")
+    arrays += ("covered", "mapped")
     means = {"mean_confidence": found.confidence.mean(), "share_sure": found.sure().mean()}
     return result_facts(found, *arrays) | means
 

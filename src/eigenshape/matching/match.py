@@ -1,11 +1,13 @@
 """Dense correspondences of a part or a whole with a whole, without training."""
 
 from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float, Int
 from scipy.spatial import cKDTree
 
+from certeig.kit.arguments import require_choice
 from certeig.kit.arrays import record
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.progress import Progress, silent
@@ -24,6 +26,7 @@ from eigenshape.matching.evidence import (
 )
 from eigenshape.matching.fitting import plan_fit
 from eigenshape.matching.growth import equally_good_maps, find_maps, first_support
+from eigenshape.matching.overlap import factor_of_overlap, match_overlap
 from eigenshape.matching.pairs import Pairs, patch_differences
 from eigenshape.matching.pieces import (
     Piece,
@@ -58,6 +61,7 @@ AS_HANDED = 0.9
 CLEAR_VOTE = 0.3
 # A piece of the whole with less free area than this share of a piece of the part is taken.
 FREE = 0.5
+Overlap = Literal["full", "partial"]
 
 
 @one_blas_thread()
@@ -66,6 +70,7 @@ def match_shapes(
     whole: MeshLike | MatchTarget,
     *,
     scale: str | float = "auto",
+    overlap: Overlap = "full",
     progress: Progress | None = None,
 ) -> ShapeMatch:
     """Find the point of a whole shape that corresponds to each vertex of a part of it.
@@ -108,6 +113,11 @@ def match_shapes(
         10 %; else "known", or "unknown" if the part is too large or too small for that. If the
         numbers of pieces differ, the piece of the whole that is nearest in size to the largest one
         of the part stands for all.
+    overlap : "full" or "partial"
+        "full": all of the part lies on the whole. "partial": each of the two shapes has regions that
+        the other one lacks. The region that both have is found, and the map in it; no vertex has a
+        place if there is none. The largest piece of each shape is matched, in one unit of length or
+        by the factor `scale`.
     progress : callable, optional
         Called as progress(fraction_done, message).
 
@@ -118,7 +128,8 @@ def match_shapes(
     Raises
     ------
     InvalidParameterError
-        If `scale` is none of these; or it is "known" or a number, and the part has more than 1.5
+        If `scale` or `overlap` is none of these; if `scale` is "unknown" for parts that overlap; or if
+        `scale` is "known" or a number, and the part has more than 1.5
         times the area of the whole, or several pieces and none with 1 % of that area.
     InvalidShapeError
         If a mesh has a face without area or twice, a vertex without face, or neighboring faces that
@@ -133,8 +144,8 @@ def match_shapes(
     Notes
     -----
     Nothing is found where part and whole have nothing in common, but a map is returned all the
-    same: look at `confidence`. If the shape can be turned into itself, there are several maps:
-    look at `n_equally_good`. A piece of more than 16,000 vertices or with needles is matched by way
+    same: look at `confidence`, or pass overlap="partial". If the shape can be turned into itself,
+    there are several maps: look at `n_equally_good`. A piece of more than 16,000 vertices or with needles is matched by way
     of a copy with fewer vertices, and the map is transferred. A part of 5,000 vertices takes 2 to 4 s on one
     core, by the machine.
 
@@ -156,10 +167,19 @@ def match_shapes(
     mesh = as_mesh(part, "part")
     require_matchable(mesh)
     scale = require_scale(scale)
+    require_choice(overlap, Overlap, "overlap")
+    is_partial = overlap == "partial"
+    if is_partial:
+        factor = factor_of_overlap(scale)
     tell(0.0, "prepare the whole")
     target = as_target(whole)
     # Even a part that is as large as it may be has its large pieces among these.
     pieces = split_pieces(mesh, LEAST_AREA / MOST_AREA)
+    if is_partial:
+        tell(0.5, "match")
+        found = match_overlap(mesh, pieces[0], target, factor)
+        tell(1.0, "matched")
+        return found
     if scale == "unknown":
         tell(0.3, "find the scale")
     factor, report = choose_factor(mesh, pieces, target, scale)

@@ -15,6 +15,9 @@ from certeig.kit.typing import ArrayLike
 class ShapeMatch(ReadOnly):
     """Where each vertex of a part lies on a whole.
 
+    Of two parts that overlap, vertices outside the overlap have no place: `vertices`, `faces` and
+    `corners` are -1 there, `weights` nan, and `confidence` and `evidence` 0.
+
     Attributes
     ----------
     vertices : (n,) int
@@ -34,6 +37,7 @@ class ShapeMatch(ReadOnly):
         other starts put the vertex, local stretch, gap that is left after bending, weight of the
         nearest patch, its difference from that of its image; and of the whole map orientation,
         support, mean difference, and the logarithm of the gap after bending times the root of strain.
+        Of parts that overlap, 3 columns: change of distances, gap, and how good the whole map is.
     score : float
         How good the whole map is, 0 to 1: orientation × coverage² × support of pairs × likeness⁴ of
         patches. Of several scales the one with the highest score is taken.
@@ -54,7 +58,10 @@ class ShapeMatch(ReadOnly):
         Factor by which lengths of the part were multiplied.
     report : tuple of str
         What was chosen or left out, in sentences: the scale, loose pieces, and, of a whole of several
-        pieces, which piece of the part was placed on which of them.
+        pieces, which piece of the part was placed on which of them. Of parts that overlap, how much of
+        each is shared.
+    covered : (m,) bool, optional
+        Of parts that overlap, which vertices of the other part lie in the overlap.
 
     See Also
     --------
@@ -82,6 +89,12 @@ class ShapeMatch(ReadOnly):
     n_equally_good: int
     scale: float
     report: tuple[str, ...]
+    covered: Bool[np.ndarray, " m"] | None = None
+
+    @property
+    def mapped(self) -> Bool[np.ndarray, " n"]:
+        """Which vertices of the part have a place: all, or of parts that overlap those that both have."""
+        return self.vertices >= 0
 
     @property
     def n_vertices(self) -> int:
@@ -100,7 +113,7 @@ class ShapeMatch(ReadOnly):
         values : (m, ...) array
             A value, or a row of values, for each vertex of the whole. Floats, such as positions or
             functions, are interpolated; whole numbers and booleans, such as labels, are copied from
-            the nearest vertex.
+            the nearest vertex. Vertices without a place get nan, -1 in whole numbers with a sign, else 0.
 
         Returns
         -------
@@ -119,7 +132,9 @@ class ShapeMatch(ReadOnly):
                 f"{table.shape}, and the map uses vertex {last}."
             )
         if table.dtype.kind in "iub":
-            return table[self.vertices]
+            found = table[self.vertices]
+            found[~self.mapped] = -1 if table.dtype.kind == "i" else 0
+            return found
         return np.einsum("nc,nc...->n...", self.weights, table[self.corners])
 
     def sure(self, least: float = 0.5) -> Bool[np.ndarray, " n"]:
