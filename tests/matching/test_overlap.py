@@ -18,6 +18,15 @@ def cut(keep):
     return rest, numbers
 
 
+@pytest.fixture(scope="module")
+def halves():
+    """Return two parts that share half of the creature, their vertices' numbers, and the match."""
+    low, high = np.quantile(HEIGHTS, [0.25, 0.75])
+    (one, ours), (two, theirs) = cut(high > HEIGHTS), cut(low < HEIGHTS)
+    return one, ours, two, theirs, es.match_shapes(one, two, overlap="partial")
+
+
+@pytest.mark.long
 def test_two_copies_overlap_everywhere():
     found = es.match_shapes(CREATURE, CREATURE, overlap="partial")
     assert found.mapped.mean() > 0.95
@@ -27,10 +36,9 @@ def test_two_copies_overlap_everywhere():
     assert away.mean() < 0.02 * np.sqrt(es.geometry.surface_area(CREATURE))
 
 
-def test_two_parts_share_what_both_have():
-    low, high = np.quantile(HEIGHTS, [0.25, 0.75])
-    (one, ours), (two, theirs) = cut(high > HEIGHTS), cut(low < HEIGHTS)
-    found = es.match_shapes(one, two, overlap="partial")
+@pytest.mark.long
+def test_two_parts_share_what_both_have(halves):
+    one, ours, two, theirs, found = halves
     for mesh, mine, others, mask in (
         (one, ours, theirs, found.mapped),
         (two, theirs, ours, found.covered),
@@ -40,10 +48,9 @@ def test_two_parts_share_what_both_have():
     assert any("share" in sentence for sentence in found.report)
 
 
-def test_vertices_outside_the_overlap_have_no_place():
-    low, high = np.quantile(HEIGHTS, [0.25, 0.75])
-    (one, _), (two, _) = cut(high > HEIGHTS), cut(low < HEIGHTS)
-    found = es.match_shapes(one, two, overlap="partial")
+@pytest.mark.long
+def test_vertices_outside_the_overlap_have_no_place(halves):
+    _, _, two, _, found = halves
     outside = ~found.mapped
     assert outside.any()
     for numbers in (found.vertices, found.faces, found.corners):
@@ -54,6 +61,7 @@ def test_vertices_outside_the_overlap_have_no_place():
     assert not found.pull(np.ones(two.n_vertices, dtype=bool))[outside].any()
 
 
+@pytest.mark.long
 def test_shapes_without_a_common_region_have_no_map():
     found = es.match_shapes(
         es.make_creature("octopus", n_vertices=800), es.icosphere(3), overlap="partial"

@@ -78,9 +78,7 @@ def match(
             ) from error
     ours, theirs = (steps.load_surface(path, repair) for path in (mesh, whole))
     with progress_bar("match") as progress:
-        found = es.match_shapes(
-            ours, theirs, scale=size, overlap=overlap, progress=progress
-        )
+        found = es.match_shapes(ours, theirs, scale=size, overlap=overlap, progress=progress)
     if as_json:
         each = {"vertices": found.vertices, "vertex_confidence": found.confidence}
         if overlap == "partial":

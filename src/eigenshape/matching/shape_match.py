@@ -3,7 +3,7 @@
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Int, Integer
 from numpy.typing import DTypeLike, NDArray
 
 from certeig.kit.arrays import ReadOnly, as_array, record
@@ -105,7 +105,9 @@ class ShapeMatch(ReadOnly):
         """Return `vertices`, so that functions that take a list of vertices take a match."""
         return np.array(self.vertices, dtype=dtype)
 
-    def pull(self, values: ArrayLike) -> Float[np.ndarray, "n ..."] | Int[np.ndarray, " n"]:
+    def pull(
+        self, values: ArrayLike
+    ) -> Float[np.ndarray, "n ..."] | Integer[np.ndarray, "n ..."] | Bool[np.ndarray, "n ..."]:
         """Give each vertex of the part the value of its point on the whole.
 
         Parameters
