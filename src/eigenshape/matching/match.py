@@ -70,7 +70,7 @@ def match_shapes(
     whole: MeshLike | MatchTarget,
     *,
     scale: str | float = "auto",
-    overlap: Overlap = "full",
+    overlap: str = "full",
     progress: Progress | None = None,
 ) -> ShapeMatch:
     """Find the point of a whole shape that corresponds to each vertex of a part of it.
@@ -145,9 +145,9 @@ def match_shapes(
     -----
     Nothing is found where part and whole have nothing in common, but a map is returned all the
     same: look at `confidence`, or pass overlap="partial". If the shape can be turned into itself,
-    there are several maps: look at `n_equally_good`. A piece of more than 16,000 vertices or with needles is matched by way
-    of a copy with fewer vertices, and the map is transferred. A part of 5,000 vertices takes 2 to 4 s on one
-    core, by the machine.
+    there are several maps: look at `n_equally_good`. A piece of more than 16,000 vertices or with
+    needles is matched by way of a copy with fewer vertices, and the map is transferred. A part
+    of 5,000 vertices takes 2 to 4 s on one core, by the machine.
 
     Examples
     --------
