@@ -26,6 +26,7 @@ class EIGENSHAPE_OT_match(Operation, bpy.types.Operator):  # noqa: N801
             ("WEIGHTS", "Weights", "Vertex groups"),
             ("KEYS", "Shape Keys", "Shape keys, turned as the surface is there"),
             ("COLORS", "Colors", "The active color attribute"),
+            ("UVS", "UV Map", "The active UV map, with its seams cut here"),
         ],
         options={"ENUM_FLAG"},
         default=set(),
@@ -45,6 +46,7 @@ class EIGENSHAPE_OT_match(Operation, bpy.types.Operator):  # noqa: N801
         whole = read_surface(context, other_object(context), repair=self.repair)
         scale, wanted = self.scale, self.transfer
         colors = whole.read_colors() if "COLORS" in wanted else None
+        texture = whole.read_texture() if "UVS" in wanted else None
         match = yield lambda progress: es.match_shapes(
             part.mesh, whole.mesh, scale=scale, progress=progress
         )
@@ -59,6 +61,9 @@ class EIGENSHAPE_OT_match(Operation, bpy.types.Operator):  # noqa: N801
             transfer_keys(whole, part, match)
         if colors is not None:
             part.write_colors(match.pull(colors))
+        if texture is not None:
+            outfit = es.matching.transfer(texture, part.mesh, match=match)
+            part.write_texture(whole.data.uv_layers.active.name, outfit.attributes)
         sure = match.sure().mean()
         self.report({"INFO"}, f"{sure:.0%} of the vertices are right with a probability of 0.5")
         for line in match.report:

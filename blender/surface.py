@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import bpy
 import numpy as np
+from scipy.sparse import eye_array
 from scipy.spatial import cKDTree
 
 import eigenshape as es
@@ -23,6 +24,8 @@ class Surface:
     places: np.ndarray  # (N,): for each vertex of `data`, its vertex in `mesh`
     used: np.ndarray  # (N,): whether it is in `mesh` at all
     sources: np.ndarray  # (n,): for each vertex of `mesh`, a vertex of `data`
+    triangles: es.TriangleMesh  # of `data`, all N vertices: `mesh` before it was repaired
+    loops: np.ndarray  # (t, 3): for each corner of `triangles`, that of its polygon
     report: tuple[str, ...]  # what was repaired
 
     def adopt(self) -> None:
@@ -110,6 +113,36 @@ class Surface:
             colors = sums / np.bincount(corners, minlength=len(sums)).clip(1)[:, None]
         return 255 * colors[self.sources, :3].astype(float)
 
+    def read_texture(self) -> es.io.MeshAttributes:
+        """Return the active UV map, as what `mesh` wears."""
+        layer = self.data.uv_layers.active
+        if layer is None:
+            raise es.InvalidParameterError(
+                f"The object must have a UV map; {self.owner.name!r} has none. "
+                "Unwrap it in Edit Mode with U, or untick UV Map."
+            )
+        coordinates = np.empty((len(layer.uv), 2), np.float32)
+        layer.uv.foreach_get("vector", coordinates.ravel())
+        none = np.full(self.triangles.n_faces, -1)
+        corners = eye_array(3 * len(none), format="csr")
+        texture = coordinates[self.loops].astype(float)
+        worn = es.io.MeshAttributes(self.triangles, corners, none + 1, none, none, texture)
+        return es.io.carry_attributes(worn, self.mesh)
+
+    def write_texture(self, name: str, worn: es.io.MeshAttributes) -> None:
+        """Keep the texture coordinates of `mesh` as the active UV map."""
+        texture = es.io.carry_attributes(worn, self.triangles).texture_coordinates
+        polygons = np.empty(len(self.loops), np.int32)
+        self.data.loop_triangles.foreach_get("polygon_index", polygons)
+        texture = one_chart_each(texture, self.triangles, polygons)
+        layer = self.data.uv_layers.get(name) or self.data.uv_layers.new(name=name)
+        coordinates = np.empty((len(layer.uv), 2), np.float32)
+        layer.uv.foreach_get("vector", coordinates.ravel())
+        coordinates[self.loops[::-1]] = texture[::-1]
+        layer.uv.foreach_set("vector", coordinates.ravel())
+        self.data.uv_layers.active = layer
+        self.data.update()
+
     def write_key(self, name: str | None, vertices: np.ndarray, value: float = 1.0) -> None:
         """Write places (n, 3) in the world as a shape key, or as vertices if there is no name.
 
@@ -154,8 +187,9 @@ def read_surface(
     context.view_layer.update()  # for the world matrix of an object that was just moved
     data = evaluated_mesh(context, owner) if apply_modifiers and owner.modifiers else owner.data
     data.calc_loop_triangles()
-    corners = np.empty(3 * len(data.loop_triangles), np.int32)
-    data.loop_triangles.foreach_get("vertices", corners)
+    corners, loops = np.empty((2, len(data.loop_triangles), 3), np.int32)
+    data.loop_triangles.foreach_get("vertices", corners.ravel())
+    data.loop_triangles.foreach_get("loops", loops.ravel())
     if not corners.size:
         raise es.InvalidShapeError(
             f"The mesh must have faces; {owner.name!r} has {len(data.vertices)} vertices and no "
@@ -163,7 +197,6 @@ def read_surface(
         )
     world = world_matrix(owner)
     points = coordinates(data.vertices) @ world[:3, :3].T + world[:3, 3]
-    triangles = corners.reshape(-1, 3)
     orientation = np.linalg.det(world[:3, :3])
     if orientation == 0:
         raise es.InvalidParameterError(
@@ -171,13 +204,16 @@ def read_surface(
             f"{tuple(owner.matrix_world.to_scale())}. Set it in the sidebar (N, Item)."
         )
     if orientation < 0:  # a mirrored object: its faces would look inward
-        triangles = triangles[:, ::-1]
+        corners, loops = corners[:, ::-1], loops[:, ::-1]
     # Loose vertices and edges are common in Blender, and are no part of the surface.
     names = ["drop_unreferenced", "auto"] if repair else ["drop_unreferenced"]
-    done = es.repair(es.TriangleMesh(points, triangles), names)
-    places, used = locate(done, points, triangles)
+    triangles = es.TriangleMesh(points, corners)
+    done = es.repair(triangles, names)
+    places, used = locate(done, points, corners)
     report = done.report if repair else ()
-    return Surface(owner, data, done.mesh, places, used, done.source_vertices, report)
+    return Surface(
+        owner, data, done.mesh, places, used, done.source_vertices, triangles, loops, report
+    )
 
 
 def locate(
@@ -193,6 +229,26 @@ def locate(
     if gone.any():
         places[gone] = cKDTree(done.mesh.vertices).query(points[gone])[1]
     return np.maximum(places, 0), used
+
+
+def one_chart_each(
+    texture: np.ndarray, triangles: es.TriangleMesh, polygons: np.ndarray
+) -> np.ndarray:
+    """Return texture coordinates (t, 3, 2) of which those of one polygon lie in one chart.
+
+    Its first triangle has the chart. Corners of another one are extrapolated from there.
+    """
+    _, firsts, numbers = np.unique(polygons, return_index=True, return_inverse=True)
+    leads = firsts[numbers]
+    points = triangles.vertices[triangles.faces]
+    sides = points[leads, 1:] - points[leads, :1]
+    shares = (points - points[leads, :1]) @ np.linalg.pinv(sides)
+    images = texture[leads, 1:] - texture[leads, :1]
+    extended = texture[leads, :1] + shares @ images
+    # In the chart they differ by how much the polygon is bent, elsewhere by more than its size.
+    sizes = np.linalg.norm(images, axis=2).max(axis=1)
+    strays = np.linalg.norm(texture - extended, axis=2) > sizes[:, None]
+    return np.where(strays[:, :, None], extended, texture)
 
 
 def evaluated_mesh(context: bpy.types.Context, owner: bpy.types.Object) -> bpy.types.Mesh:

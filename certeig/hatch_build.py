@@ -64,6 +64,8 @@ RELEASE = [
     *["-O3", "-s"],
     "-fno-sanitize=undefined",  # which zig turns on by itself
     "-nostdlib",  # otherwise zig builds parts of the C library first, for eight seconds
+    # A larger frame calls that library on Windows, so that no kernel may have one anywhere.
+    "-Wframe-larger-than=3967",  # bytes: a page, less the 128 below the stack that Linux may use
 ]
 # With checks that end the process, and name the line
 UNDEFINED = [
@@ -138,6 +140,8 @@ def compile_library(
 ) -> None:
     """Compile one library of the kernels of some packages."""
     flags = [*FLAGS, *options, "-target", target.zig, f"-mcpu={target.processors[level]}"]
+    if "macos" in target.zig:  # otherwise the library names the folder in which it was linked
+        flags.append(f"-Wl,-install_name,{library.name}")
     folders = [f"-I{folder}" for folder in (KIT, *packages)]
     command = [sys.executable, "-m", "ziglang", "cc", *flags, *folders, "-o"]
     kernels = sorted({*COMMON, *(path for package in packages for path in package.rglob("*.c"))})

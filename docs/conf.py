@@ -71,6 +71,7 @@ html_static_path = ["_static"]
 html_favicon = "_static/favicon.svg"
 html_css_files = ["eigenshape.css"]
 html_context = {"default_mode": "auto"}  # light or dark, as the reader's system is
+html_sidebars = {"decisions/*": []}  # a list of all would be longer than any of them
 html_theme_options = {
     "show_prev_next": False,
     "navigation_with_keys": False,

@@ -5,6 +5,7 @@ import importlib
 import os
 import re
 import subprocess
+import tempfile
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Annotated, get_args, get_origin
@@ -294,6 +295,35 @@ def test_a_new_kernel_is_compiled_declared_and_called(tmp_path, monkeypatch):
     rows, sums = np.random.default_rng(0).random((7, 3)), np.zeros(3)
     assert add_rows(rows, 0.5, sums)
     np.testing.assert_allclose(sums, rows.sum(axis=0) / 2)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", hatch_build.TARGETS)
+def test_the_kernels_compile_for_every_platform(name, tmp_path):
+    pytest.importorskip("ziglang")
+    target = hatch_build.TARGETS[name]
+    library = tmp_path / "kernels.so"
+    hatch_build.compile_library(target, min(target.processors), library, hatch_build.PACKAGES)
+    content = library.read_bytes()
+    assert len(content) > 10_000
+    assert f"{tempfile.gettempdir()}{os.sep}".encode() not in content  # where it was linked
+
+
+def test_a_kernel_has_a_frame_of_less_than_a_page(tmp_path):
+    pytest.importorskip("ziglang")
+    source = tmp_path / "large_loops.c"
+    source.write_text(
+        '#include "kernels.h"\n'
+        "KERNEL void reverse(int64_t *numbers) {\n"
+        "    volatile int64_t all[513];\n"
+        "    for (int i = 0; i < 513; i++) all[i] = numbers[i];\n"
+        "    for (int i = 0; i < 513; i++) numbers[i] = all[512 - i];\n}\n"
+    )
+    target = hatch_build.TARGETS[hatch_build.target_name()]
+    with pytest.raises(SystemExit, match="kernels cannot be compiled"):
+        hatch_build.compile_library(
+            target, min(target.processors), tmp_path / "large.so", [tmp_path]
+        )
 
 
 def test_sources_have_one_layout():

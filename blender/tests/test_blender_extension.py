@@ -25,7 +25,7 @@ extension = importlib.util.module_from_spec(spec)
 sys.modules["eigenshape_extension"] = extension
 spec.loader.exec_module(extension)
 
-from eigenshape_extension import bending, build, matching, operation, panel  # noqa: E402
+from eigenshape_extension import bending, build, matching, operation, panel, surface  # noqa: E402
 from eigenshape_extension.surface import read_surface  # noqa: E402
 from mathutils import Matrix, Quaternion  # noqa: E402
 
@@ -356,6 +356,48 @@ def test_a_match_transfers_weights_keys_and_colors(pair):
     shown = other.data.color_attributes["eigenshape"].data
     colors = match.pull(read_surface(bpy.context, whole).read_colors())
     np.testing.assert_allclose([each.color_srgb[:3] for each in shown], colors / 255, atol=0.005)
+
+
+@pytest.mark.long
+def test_a_uv_map_is_cut_where_its_seams_are(pair):
+    whole, other = pair
+    around = whole.data.uv_layers.new(name="around")
+    points = coordinates(whole)
+    for face in whole.data.polygons:
+        corners = points[face.vertices]
+        angles = np.unwrap(np.arctan2(corners[:, 1], corners[:, 2]))
+        for loop, angle, x in zip(face.loop_indices, angles, corners[:, 0], strict=True):
+            around.uv[loop].vector = (angle / 7, x)
+    match = es.match_shapes(*(read_surface(bpy.context, each).mesh for each in (other, whole)))
+    assert bpy.ops.eigenshape.match(transfer={"UVS"}) == FINISHED
+    found = other.data.uv_layers["around"]
+    assert other.data.uv_layers.active == found
+    sure = match.sure()
+    where = match.pull(points)[:, 0]
+    vertices = np.array([loop.vertex_index for loop in other.data.loops])
+    uv = np.array([each.vector[:] for each in found.uv])
+    np.testing.assert_allclose(
+        uv[sure[vertices], 1], where[vertices][sure[vertices]], atol=0.02 * np.ptp(points[:, 0])
+    )
+    # At the seam, none goes back over the map: what spans half of it does so on the animal, at its ends.
+    given = np.array([each.vector[:] for each in around.uv])
+    wide, widest = (np.ptp(each[:, 0].reshape(-1, 3), axis=1) > 0.4 for each in (uv, given))
+    assert wide.sum() <= 2 * widest.sum() < 10
+
+
+def test_a_polygon_looks_into_one_chart():
+    square = es.TriangleMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.1]], [[0, 1, 2], [0, 2, 3]])
+    texture = square.vertices[square.faces][:, :, :2] / 4
+    elsewhere = texture + np.array([0, 0.7])[:, None, None]
+    for given, expected in ((texture, texture), (elsewhere, texture)):
+        found = surface.one_chart_each(given, square, np.array([0, 0]))
+        np.testing.assert_allclose(found, expected, atol=0.01)
+
+
+def test_a_uv_map_must_be_there_to_be_transferred(animal, add, creature):
+    add("other", creature.vertices, creature.faces.tolist())
+    with pytest.raises(RuntimeError, match="must have a UV map; 'animal' has none"):
+        bpy.ops.eigenshape.match(transfer={"UVS"})
 
 
 def test_turns_between_two_poses_are_their_rotation():

@@ -1,9 +1,12 @@
-"""Checks of arrays that belong to a shape: rows of coordinates and of indices, values of vertices and faces."""
+"""Arrays that belong to a shape: checks of coordinates, indices and values; equal rows, and linked ones."""
 
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Bool, Float, Int
 from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
 
 from certeig.kit.arrays import all_finite, as_array, real_numbers, whole_number
 from certeig.kit.errors import InvalidParameterError
@@ -153,3 +156,36 @@ def require_finite_rows(rows: NDArray[np.float64], name: str, noun: str) -> None
 def step_number(value: Integer, name: str) -> int:
     """Return `value` as an int from 1 to a million, the number of steps of a loop."""
     return whole_number(value, name, 1, MOST_STEPS, "no shape needs more steps")
+
+
+def label_components(
+    n: int, one: Int[np.ndarray, " k"], two: Int[np.ndarray, " k"]
+) -> tuple[int, Int[np.ndarray, " n"]]:
+    """Count the groups of n things of which k pairs are linked, and return the group of each."""
+    graph = sp.coo_array((np.ones(len(one), dtype=np.int8), (one, two)), shape=(n, n))
+    count, labels = connected_components(graph, directed=False)
+    return int(count), labels.astype(np.int64)
+
+
+def sorted_rows(
+    rows: Int[np.ndarray, "r c"],
+) -> tuple[Int[np.ndarray, " r"], Int[np.ndarray, "r c"], Bool[np.ndarray, " r"]]:
+    """Sort rows: return the stable order, the sorted rows, and which repeat the row before."""
+    order = np.lexsort(rows.T[::-1])
+    ordered = rows[order]
+    repeats = np.zeros(len(rows), dtype=bool)
+    repeats[1:] = (ordered[1:] == ordered[:-1]).all(axis=1)
+    return order, ordered, repeats
+
+
+def number_places(points: Float[np.ndarray, "n d"]) -> Int[np.ndarray, " n"]:
+    """Return for each point the number of its place; equal points have the same place."""
+    # np.unique compares bytes; adding 0.0 turns -0.0 into 0.0.
+    _, place = np.unique(points + 0.0, axis=0, return_inverse=True)
+    return place.ravel().astype(np.int64)
+
+
+def adjacency_matrix(edges: Int[np.ndarray, "e 2"], values: np.ndarray, n: int) -> sp.csr_array:
+    """Return the symmetric matrix of weighted edges, each given once."""
+    both = np.concatenate([edges, edges[:, ::-1]]).T
+    return sp.coo_array((np.tile(values, 2), both), shape=(n, n)).tocsr()

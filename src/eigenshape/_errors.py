@@ -67,3 +67,12 @@ class MissingExtraError(CerteigError, ImportError):
 def try_auto(shape: str = "mesh") -> str:
     """Return the remedy for a fault that the repair "auto" fixes, as the end of a message."""
     return f'Try repair({shape}, ["auto"]), or --repair auto on the command line.'
+
+
+# Nouns of reports whose plural is not formed with an s.
+PLURALS = {"vertex": "vertices", "tetrahedron": "tetrahedra", "simplex": "simplices"}
+
+
+def count_nouns(number: int, noun: str) -> str:
+    """Return a number with its noun, which is in the plural if the number is not 1."""
+    return f"{number} {noun if number == 1 else PLURALS.get(noun, noun + 's')}"

@@ -43,6 +43,7 @@ MAKERS |= {
     "Quadrature": "es.geometry.shape_quadrature(mesh)",
     "Rate": "es.stability.theorem_rate(theorem, dim)",
     "Rotation": "es.Rotation(pivot, axis, angle)",
+    "Scaling": "es.deformation.Scaling(pivot, factors)",
     "Segmentation": "es.segment(tree)",
     "ShapeIndex": "es.ShapeIndex.open(folder)",
     "ShapeMatch": "es.match_shapes(part, whole)",

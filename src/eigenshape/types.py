@@ -32,7 +32,7 @@ _TEXTS = {
 
     "neumann" leaves the boundary free, "dirichlet" fixes it at zero.
     """,
-    "Handle": """A motion of a region: an `es.Rotation` or an `es.Translation`.""",
+    "Handle": """A motion of a region: `es.Rotation`, `es.Translation` or `es.deformation.Scaling`.""",
     "Mesh": """A mesh of any dimension: an `es.TriangleMesh` or an `es.SimplicialMesh`.""",
     "MeshLike": """A mesh, or an object from which `es.as_mesh` makes one.
 

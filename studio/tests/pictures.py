@@ -1,12 +1,14 @@
-"""Draw the pictures of the docs: the studio as one sees it, moved by mouse and keyboard alone.
+"""Draw the pictures and the film of the docs: the studio as one sees it, moved by mouse and keyboard alone.
 
-    python studio/tests/pictures.py docs/pictures
+    python studio/hatch_build.py && python studio/tests/pictures.py docs/pictures
 
+A digest of the window is written beside them, and a test compares it with that of today.
 A giraffe whose head and neck are turned, its eigenfunctions, and its parts; a horse and the scan of
 another pose, with the map between them. Then figures 6.3, 6.4 and 6.13 of the thesis, by the mouse:
 knee, arm and waist of a biped, and a bar that is twisted.
 """
 
+import hashlib
 import math
 import sys
 import tempfile
@@ -28,11 +30,14 @@ from browser import (
     wait_until_bound,
     wait_until_still,
 )
+from film import main as draw_film
 from PIL import Image
 from playwright.sync_api import Browser
 
 import eigenshape as es
+from eigenshape_studio.bundle import BUNDLE, read_static
 
+DIGEST = "studio.sha256"  # of the window that the pictures show
 NECK = 0.62  # height, of the whole, above which the giraffe is turned
 FIXED = 4  # number of the fixed part, after those of the four regions
 # Edits of a biped that stands from -0.98 to 1.08 with its arms spread to x = -0.91 and 0.91: the sides
@@ -203,6 +208,15 @@ def motion_of(page, axis):
     return math.degrees(handle["angle"]) * handle["axis"][axis]
 
 
+def digest_of_window():
+    """Return a digest of the built page, in which comments and layout of the sources are gone."""
+    return hashlib.sha256(read_static("index.html") + read_static(BUNDLE)).hexdigest()
+
+
 if __name__ == "__main__":
+    target = Path(sys.argv[1])
     with start_browser() as chromium:
-        sys.stdout.writelines(f"{path}\n" for path in main(chromium, Path(sys.argv[1])))
+        sys.stdout.writelines(f"{path}\n" for path in main(chromium, target))
+    draw_film(target / "film.gif")
+    # Last, so that pictures of which some could not be drawn remain old
+    (target / DIGEST).write_text(f"{digest_of_window()}\n")

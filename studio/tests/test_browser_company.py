@@ -98,6 +98,12 @@ def test_a_second_shape_is_mapped_corrected_and_takes_over_what_is_painted(page,
         page.locator('[data-test="canvas"]').nth(side).press("ArrowUp")
         ours, theirs = np.array(page.evaluate(EYES))
         np.testing.assert_allclose(theirs, laid[:, :3] @ ours + laid[:, 3], atol=1e-5)
+    page.keyboard.press("3")
+    assert page.evaluate(f"[{', '.join(BOTH)}].map(({{ camera }}) => camera.fov)") == [0.1, 0.1]
+    ours, theirs = np.array(page.evaluate(EYES))
+    np.testing.assert_allclose(theirs, laid[:, :3] @ ours + laid[:, 3], rtol=1e-5)
+    page.keyboard.press("5")
+    page.keyboard.press("Home")
 
     # Equal colors correspond; what is not sure is gray.
     partners, back = (np.array(page.evaluate(f"Array.from({MAP}.partners[{i}])")) for i in (0, 1))

@@ -314,7 +314,7 @@ def walk_to(page, name):
 
 
 def test_keys_alone_choose_bend_and_undo(page, mesh, rig):
-    page.keyboard.press("1")
+    page.keyboard.press("Shift+Digit1")
     page.keyboard.press("b")
     wait_until_bound(page)
     walk_to(page, "box-low-1")

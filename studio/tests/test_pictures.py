@@ -5,10 +5,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pictures import main
+from pictures import DIGEST, digest_of_window, main
 from PIL import Image
 
 DOCS = Path(__file__).parents[2] / "docs"
+DRAW = (
+    "The window has changed since its pictures were drawn. Run "
+    "`python studio/hatch_build.py && python studio/tests/pictures.py docs/pictures`, and look at them."
+)
+
+
+def test_the_pictures_of_the_docs_are_as_new_as_the_window():
+    drawn = DOCS / "pictures" / DIGEST
+    assert drawn.is_file(), DRAW
+    assert drawn.read_text().strip() == digest_of_window(), DRAW
 
 
 @pytest.mark.long

@@ -473,6 +473,8 @@ HANDLES = [
     [{**TURN, "angle": None}],
     [{"type": "translation", "vector": [1e999, 0, 0]}],
     [{"type": "translation", "vector": [[1, 2], 3]}],
+    [{"type": "scaling", "pivot": [0, 0, 0]}],
+    [{"type": "scaling", "pivot": [0, 0, 0], "factors": [1, 0, 1]}],
 ]
 
 

@@ -1,6 +1,10 @@
+import inspect
+import itertools
+
 import numpy as np
 import pytest
 
+import eigenshape as es
 from certeig.kit.errors import ConvergenceError, InvalidParameterError
 from eigenshape._errors import InvalidShapeError
 from eigenshape.calculus import geodesic_paths
@@ -115,6 +119,141 @@ def test_at_a_corner_angles_are_shares_of_the_angle_around_it():
             octahedron, 2, [height * np.cos(angle), height * np.sin(angle)]
         ).points[-1]
         np.testing.assert_allclose(np.abs(end), [0.5, 0.5, 0], atol=1e-12)
+
+
+def place(mesh, *points):
+    return es.geometry.closest_points(mesh, np.array(points))
+
+
+def face_frame(mesh, face):
+    """Return x along the first side of a face, and y a quarter turn further."""
+    one, two, three = mesh.vertices[mesh.faces[face]]
+    x = (two - one) / np.linalg.norm(two - one)
+    normal = np.cross(x, three - one)
+    return np.stack([x, np.cross(normal / np.linalg.norm(normal), x)])
+
+
+def points_of(mesh, n=40, seed=0):
+    """Return points inside faces, on edges, at vertices and next to them, away from the boundary."""
+    rng = np.random.default_rng(seed)
+    inside = mesh.vertices[mesh.faces].mean(axis=1)
+    on_edges = mesh.vertices[mesh.faces[:, :2]].mean(axis=1)
+    beside = mesh.vertices + np.array([1e-5, 3e-8, 0])
+    found = np.concatenate([inside, on_edges, mesh.vertices, beside])
+    found = found[(np.abs(found[:, :2] - 0.5) < 0.35).all(axis=1)]
+    return rng.permutation(found)[:n]
+
+
+def test_paths_between_points_inside_faces_of_a_plane_are_straight():
+    square = es.shapes.grid(7, 5)
+    points = points_of(square)
+    for one, two in itertools.pairwise(points):
+        path = geodesic_path(square, place(square, one), place(square, two))
+        assert path.length == pytest.approx(np.linalg.norm(two - one), abs=1e-6)
+        np.testing.assert_allclose(path.points[[0, -1]], [one, two], atol=1e-6)
+    close = place(square, points[0] + [1e-3, 0, 0])
+    assert geodesic_path(square, place(square, points[0]), close).length == pytest.approx(1e-3)
+    to_vertex = geodesic_path(square, place(square, points[0]), 0)
+    assert to_vertex.length == pytest.approx(np.linalg.norm(points[0]), abs=1e-6)
+
+
+def test_paths_between_points_bend_over_edges():
+    cube = es.geometry.boundary_surface(es.shapes.box(5, 5, 5))
+    for height in (0.4, 0.5, 0.9):
+        front, side = place(cube, [0.3, 0, 0.4]), place(cube, [1, 0.6, height])
+        exact = np.hypot(0.7 + 0.6, height - 0.4)
+        assert geodesic_path(cube, front, side).length == pytest.approx(exact)
+    corner = np.flatnonzero((cube.vertices == 0).all(axis=1))
+    distances = es.geometry.geodesic_distances(cube, front)[0]
+    np.testing.assert_allclose(distances[corner], 0.5)
+
+
+def test_walks_from_points_undo_logarithms_and_distances_on_a_plane():
+    square = es.shapes.grid(7, 5)
+    rng = np.random.default_rng(1)
+    solver = es.calculus.prepare_vector_heat(square)
+    for point in points_of(square):
+        start = place(square, point)
+        frame = face_frame(square, start.simplices[0])
+        vector = 0.1 * rng.uniform(-1, 1, 2)
+        path = trace_geodesic(square, start, vector)
+        np.testing.assert_allclose(path.points[-1], point + vector @ frame, atol=1e-9)
+        away = square.vertices - point
+        distances = es.geometry.geodesic_distances(square, start)[0]
+        np.testing.assert_allclose(distances, np.linalg.norm(away, axis=1), atol=1e-7)
+        for method in ("affine", "adaptive"):
+            found = es.calculus.logarithmic_map(solver, start, method=method)
+            np.testing.assert_allclose(found, away @ frame.T, atol=1e-9)
+    assert trace_geodesic(square, start, [0, 0]).length == 0
+    assert trace_geodesic(square, start, [9, 0]).length < 1.5  # at the boundary
+
+
+def test_points_are_as_good_sources_as_vertices_on_a_sphere():
+    ball = es.icosphere(4)
+    start = place(ball, [0.3, 0.2, 0.9])
+    source = start.points[0] / np.linalg.norm(start.points[0])
+    exact = np.arccos(np.clip(ball.vertices @ source, -1, 1))
+    found = es.geometry.geodesic_distances(ball, start)[0]
+    of_vertex = es.geometry.geodesic_distances(ball, [0])[0]
+    exact_of_vertex = np.arccos(np.clip(ball.vertices @ ball.vertices[0], -1, 1))
+    assert np.abs(found - exact).max() < np.abs(of_vertex - exact_of_vertex).max()
+    maps = es.calculus.logarithmic_map(ball, start)
+    near = exact < 1.5
+    assert np.abs(np.linalg.norm(maps, axis=1) - exact)[near].max() < 0.011
+    for vertex in np.flatnonzero(near)[::100]:
+        end = trace_geodesic(ball, start, maps[vertex]).points[-1]
+        assert np.linalg.norm(end - ball.vertices[vertex]) < 0.02
+
+
+@pytest.mark.parametrize("unit", [1e-100, 1e100])
+def test_paths_of_points_scale_exactly(unit):
+    ball = es.icosphere(2)
+    large = es.TriangleMesh(unit * ball.vertices, ball.faces)
+    one, two = place(ball, [0.3, 0.2, 0.9]), place(ball, [-0.3, 0.7, 0.1])
+    far_one, far_two = place(large, unit * one.points[0]), place(large, unit * two.points[0])
+    for function in (
+        lambda mesh, one, two: geodesic_path(mesh, one, two).length,
+        lambda mesh, one, two: trace_geodesic(mesh, one, [0.3 * mesh.vertices.max(), 0]).points,
+        lambda mesh, one, two: es.geometry.geodesic_distances(mesh, one),
+        lambda mesh, one, two: es.calculus.logarithmic_map(mesh, one),
+    ):
+        expected = function(ball, one, two)
+        np.testing.assert_allclose(function(large, far_one, far_two) / unit, expected, atol=1e-9)
+
+
+def test_points_of_another_mesh_are_refused():
+    ball, other = es.icosphere(2), es.icosphere(3)
+    one, far = place(ball, [0, 0, 1.0]), place(other, [0.3, 0.2, 0.9])
+    outside = es.geometry.SurfacePoints(far.points, far.simplices + 10_000, far.weights)
+    solid = es.geometry.SurfacePoints(one.points, one.simplices, np.full((1, 4), 0.25))
+    two = place(ball, [0, 0, 1.0], [0, 1.0, 0])
+    for name, call in {
+        "start": lambda at: geodesic_path(ball, at, 0),
+        "end": lambda at: geodesic_path(ball, 0, at),
+        "sources": lambda at: es.geometry.geodesic_distances(ball, at),
+        "source": lambda at: es.calculus.logarithmic_map(ball, at),
+        "start ": lambda at: trace_geodesic(ball, at, [1.0, 0]),
+    }.items():
+        for wrong in (far, outside, solid):
+            with pytest.raises(
+                InvalidParameterError,
+                match=rf"{name.strip()} must lie on this mesh; point 0 .*closest_points\(mesh",
+            ):
+                call(wrong)
+        call(place(ball, *far.points))  # the remedy
+        if name != "sources":
+            with pytest.raises(
+                InvalidParameterError, match=f"{name.strip()} must be one point; there are 2"
+            ):
+                call(two)
+    with pytest.raises(
+        InvalidParameterError,
+        match=r"start must be a vertex or a SurfacePoints; the value is a list",
+    ):
+        inspect.unwrap(geodesic_path)(ball, [0, 0, 1.0], 0)
+    solver = es.calculus.prepare_vector_heat(ball)
+    with pytest.raises(InvalidParameterError, match=r"The face of source must lie in 0..319"):
+        es.calculus.logarithmic_map(solver, outside)
 
 
 def test_bad_input_is_named(monkeypatch):

@@ -1,6 +1,8 @@
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
+import eigenshape as es
 from certeig.kit.arguments import require_choice
 from certeig.kit.errors import InvalidParameterError
 from eigenshape._errors import InvalidShapeError
@@ -13,7 +15,7 @@ from eigenshape.calculus.vector_heat import (
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import disjoint_union
-from eigenshape.operators.connection import tangent_frames
+from eigenshape.operators.connection import connection_laplacian, tangent_frames
 from eigenshape.shapes.surfaces import grid, icosphere, torus
 
 
@@ -139,7 +141,70 @@ def test_heat_that_underflows_is_named_and_the_remedy_works():
     assert lengths == pytest.approx(np.linalg.norm(strip.vertices, axis=1), abs=1e-6)
 
 
-def test_a_cloud_is_refused_with_what_takes_it():
-    plain = getattr(prepare_vector_heat, "__wrapped__", prepare_vector_heat)
-    with pytest.raises(InvalidParameterError, match=r"no faces; .* calculus\.heat_distances"):
-        plain(PointCloud(icosphere(1).vertices, dim=2))
+def sphere_cloud(n, seed=0):
+    points = np.random.default_rng(seed).standard_normal((n, 3))
+    return PointCloud(points / np.linalg.norm(points, axis=1, keepdims=True), dim=2)
+
+
+def test_frames_of_a_cloud_are_orthonormal_and_tangent():
+    cloud = sphere_cloud(500)
+    frames = tangent_frames(cloud)
+    product = frames @ frames.swapaxes(1, 2)
+    np.testing.assert_allclose(product, np.broadcast_to(np.eye(2), product.shape), atol=1e-12)
+    across = np.einsum("nkd,nd->nk", frames, cloud.points)
+    assert np.abs(across).mean() < 0.08
+    normals = np.cross(frames[:, 0], frames[:, 1])
+    assert (normals[np.arange(500), np.abs(normals).argmax(axis=1)] > 0).all()
+
+
+@pytest.mark.parametrize(("n", "worst"), [(1000, 3.5), (4000, 2.0)])
+def test_transport_on_a_cloud_follows_great_circles(n, worst):
+    cloud = sphere_cloud(n)
+    points, frames = cloud.points, tangent_frames(cloud)
+    start = int(points[:, 2].argmax())
+    carried = transport_vectors(cloud, [start], [[2.0, 0.0]])
+    found = np.einsum("nk,nkd->nd", carried, frames)
+    np.testing.assert_allclose(np.linalg.norm(found, axis=1), 2)
+    # The turn about the axis of the great circle takes the vector along it.
+    axes = np.cross(points[start], points)
+    sines, cosines = np.linalg.norm(axes, axis=1, keepdims=True), points @ points[start]
+    axes /= np.where(sines > 0, sines, 1)
+    vector = frames[start, 0]
+    exact = vector * cosines[:, None] + np.cross(axes, vector) * sines
+    exact += axes * (axes @ vector * (1 - cosines))[:, None]
+    angles = np.degrees(np.arccos(np.clip(np.sum(found * exact, axis=1) / 2, -1, 1)))
+    assert angles[cosines > -0.8].mean() < worst
+
+
+def test_transport_on_a_plane_cloud_is_parallel_whatever_side_normals_look_to():
+    rng = np.random.default_rng(0)
+    plane = Rotation.from_euler("xyz", [0.3, 0.5, 0.7]).as_matrix()
+    points = np.pad(rng.uniform(0, 1, (400, 2)), ((0, 0), (0, 1))) @ plane
+    for unit in (1, 1e-100, 1e100):
+        cloud = PointCloud(unit * points, dim=2)
+        solver = prepare_vector_heat(cloud)
+        found = np.einsum(
+            "nk,nkd->nd", transport_vectors(solver, [7], [[0, 1.0]]), tangent_frames(cloud)
+        )
+        np.testing.assert_allclose(found, np.broadcast_to(found[7], found.shape), atol=1e-9)
+        values = extend_scalar(solver, [7, 8], [1.0, 1.0])
+        np.testing.assert_allclose(values, 1)
+
+
+def test_the_connection_of_a_cloud_is_symmetric_and_positive():
+    laplacian = connection_laplacian(sphere_cloud(1000))
+    assert abs(laplacian.stiffness - laplacian.stiffness.T).max() == 0
+    assert np.linalg.eigvalsh(laplacian.stiffness.toarray())[0] > 1e-4  # no parallel field
+    # The smallest eigenvalue on the sphere is 1.
+    assert es.solve_spectrum(laplacian, 1).eigenvalues[0] == pytest.approx(1, abs=0.1)
+
+
+def test_what_needs_faces_refuses_the_heat_of_a_cloud():
+    solver = prepare_vector_heat(sphere_cloud(100))
+    assert repr(solver).startswith("VectorHeat(100 points")
+    for call in (
+        lambda: logarithmic_map(solver, 0),
+        lambda: es.calculus.signed_heat_distance(solver, [[0, 1]]),
+    ):
+        with pytest.raises(InvalidParameterError, match="mesh must have faces; this VectorHeat"):
+            call()

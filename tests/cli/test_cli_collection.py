@@ -81,6 +81,26 @@ def test_landmarks_of_all_specimens_are_a_table(output):
     assert es.read_mesh(output / "mean.ply").n_vertices > 500
 
 
+def test_points_of_curves_are_spaced_and_carried_with_the_table_of_their_neighbors(scans, tmp_path):
+    path = es.calculus.geodesic_path(hand(0), 100, 300).points
+    drawn = path[np.linspace(0, len(path) - 1, 8).astype(int)]
+    names = [f"drawn {i}" for i in range(8)]
+    template = es.morphometrics.Landmarks(names, drawn, curves=[range(8)])
+    es.morphometrics.write_landmarks(template, tmp_path / "hand 0.mrk.json")
+    es.write_mesh(hand(0), tmp_path / "hand 0.ply")
+    es.write_mesh(hand(1), tmp_path / "hand 1.ply")
+    command = ["collection", tmp_path, "-o", tmp_path / "out", "--workers", 1, "--curve-points"]
+    assert "n_points must lie in 2..10000; it is 1" in run(*command, 1, code=2).stderr
+    done = run(*command, 4)
+    path = tmp_path / "out" / "landmarks.sliders.csv"
+    assert f"wrote {path}" in done.stderr
+    assert path.read_text() == "before,slide,after\n1,3,4\n3,4,2\n"
+    table = es.morphometrics.read_specimens(tmp_path / "out" / "landmarks.csv")
+    assert table["hand 1"].names == ("drawn 0", "drawn 7", "curve 1 point 1", "curve 1 point 2")
+    steps = np.diff(table["hand 1"].points[[0, 2, 3, 1]], axis=0)
+    assert np.ptp(np.linalg.norm(steps, axis=1)) < 0.2 * np.linalg.norm(steps, axis=1).mean()
+
+
 def test_the_page_holds_all_that_it_shows(output):
     page, data = page_data(output)
     assert not set(re.findall(r"https?://[^\"'\s]+", page)) - {"http://www.w3.org/2000/svg"}

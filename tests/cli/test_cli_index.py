@@ -358,6 +358,7 @@ def test_a_match_is_drawn_from_the_side_of_the_query(tmp_path):
         sheets.explanation(query, "scan", match, repairs=(), side={"view": "auto", "up": "auto"}),
     ]
     for figure in figures:
+        assert figure.axes[1].get_title().endswith(", turned")
         pictures = [axes.images[0].get_array() for axes in figure.axes if axes.images]
         one, two = ((picture != picture[0, 0]).any(axis=2) for picture in pictures)
         assert 0.1 < one.mean() < 0.9

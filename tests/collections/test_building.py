@@ -334,6 +334,39 @@ def test_landmarks_are_carried_with_their_errors(built):
     assert not carried.doubtful[2].any()
 
 
+def test_curves_are_carried_and_spaced_evenly_on_each_surface(built):
+    ball = make_specimen(0)
+    order = np.argsort(ball.vertices[:, 0])
+    ends = order[[0, -1]]
+    path = es.calculus.geodesic_path(ball, *ends).points
+    drawn = es.morphometrics.Landmarks(
+        ["left", "right", *map(str, range(5))],
+        np.concatenate([ball.vertices[ends], path[np.linspace(1, len(path) - 2, 5).astype(int)]]),
+        curves=[[0, 2, 3, 4, 5, 6, 1]],
+    )
+    template = es.morphometrics.resample_curves(drawn, 9, mesh=ball)
+    carried = es.collections.carry_landmarks(built, {"ball 0": template})
+    assert carried.curves == template.curves == ((0, *range(2, 9), 1),)
+    assert carried.names == template.names
+    np.testing.assert_array_equal(carried.points[0], template.points)
+    for name, own in carried.landmarks.items():
+        surface = built.read_specimen(name)
+        on = es.geometry.closest_points(surface, own.points).points
+        size = np.ptp(surface.vertices)
+        np.testing.assert_allclose(on, own.points, atol=1e-9 * size)
+        steps = np.linalg.norm(np.diff(own.points[list(own.curves[0])], axis=0), axis=1)
+        assert np.ptp(steps) < 0.05 * steps.mean()
+    # Others may have the same points without curves; curves with other rows are refused.
+    plain = es.morphometrics.Landmarks(template.names, carried.points[1])
+    both = es.collections.carry_landmarks(built, {"ball 1": plain, "ball 0": template})
+    assert both.curves == template.curves
+    turned = es.morphometrics.Landmarks(
+        template.names, carried.points[1], curves=[template.curves[0][::-1]]
+    )
+    with pytest.raises(es.InvalidParameterError, match="All curves of labelled must have the same"):
+        es.collections.carry_landmarks(built, {"ball 1": turned, "ball 0": template})
+
+
 def test_a_missing_landmark_is_carried_and_a_wrong_one_is_doubtful(built, tmp_path):
     chosen = [0, 1, 5, 100, 200, 300]
     names = [f"landmark {i}" for i in chosen]

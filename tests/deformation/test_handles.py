@@ -3,7 +3,7 @@ import pytest
 
 import eigenshape as es
 from certeig.kit.errors import InvalidParameterError
-from eigenshape.deformation.handles import Rotation, Translation, affine_offset
+from eigenshape.deformation.handles import Rotation, Scaling, Translation, affine_offset
 
 QUARTER = np.pi / 2
 POINTS = np.array([[1.0, 0.0, 0.0], [2.0, 0.0, 5.0], [1.0, 3.0, 0.0]])
@@ -54,7 +54,21 @@ def test_a_translation_goes_by_its_share_and_turns_nothing():
     np.testing.assert_array_equal(handle.turn, [0, 0, 0])
 
 
-@pytest.mark.parametrize("handle", [Rotation([1, -2, 3], [1, 1, -2], 5.0), Translation([1, 2, 3])])
+def test_a_scaling_keeps_its_pivot_and_goes_by_its_share():
+    handle = Scaling([1, 0, 0], [3, 1, 0.5])
+    np.testing.assert_array_equal(moved(handle, POINTS), [[1, 0, 0], [4, 0, 2.5], [1, 3, 0]])
+    np.testing.assert_array_equal(moved(handle, POINTS, 0.5), [[1, 0, 0], [3, 0, 3.75], [1, 3, 0]])
+    np.testing.assert_array_equal(handle.turn, [0, 0, 0])
+
+
+@pytest.mark.parametrize(
+    "handle",
+    [
+        Rotation([1, -2, 3], [1, 1, -2], 5.0),
+        Translation([1, 2, 3]),
+        Scaling([1, -2, 3], [0.5, 1, 4]),
+    ],
+)
 def test_the_matrix_says_what_carry_does(handle):
     ends = np.column_stack([POINTS, np.ones(3)])
     np.testing.assert_allclose(
@@ -89,6 +103,37 @@ def test_bad_numbers_are_refused_by_name():
         Rotation([0, 0, 0], [0, 0, 1], np.inf)
     with pytest.raises(InvalidParameterError, match="vector must be finite; entry 1 is nan"):
         Translation([0, np.nan, 0])
+    with pytest.raises(
+        InvalidParameterError, match=r"the factor along y is -2\.0\. A factor of 0.5"
+    ):
+        Scaling([0, 0, 0], [1, -2, 1])
+    assert Scaling([0, 0, 0], [1, 0.5, 1]).factors[1] == 0.5
+
+
+def test_each_vertex_is_scaled_by_its_share():
+    bar = es.geometry.boundary_surface(es.shapes.box(4, 16, 4, sides=(1, 4, 1)))
+    binding = es.deformation.bind(es.rig_shape(bar), [bar.vertices[:, 1] > 1.5])
+    handle = Scaling([0.5, 2, 0.5], [2, 1, 0.5])
+    scaled = bar.vertices + handle.carry(bar.vertices, binding.shares[0])
+    for mode in ("graded", "uncrossed"):
+        bent = es.deformation.bend(binding, [handle], mode=mode).vertices
+        np.testing.assert_allclose(bent, scaled, atol=1e-14)
+    by_thesis = es.deformation.bend(binding, [handle], mode="thesis").vertices
+    width, _, depth = np.ptp(by_thesis[bar.vertices[:, 1] == 4], axis=0)
+    assert width > 1.8
+    assert depth < 0.6
+
+
+def test_a_turned_end_keeps_its_size_while_the_other_one_is_scaled():
+    bar = es.geometry.boundary_surface(es.shapes.box(4, 16, 4, sides=(1, 4, 1)))
+    upper, lower = (bar.vertices[:, 1] > 3, bar.vertices[:, 1] < 1)
+    binding = es.deformation.bind(es.rig_shape(bar), [upper, lower])
+    handles = [Rotation([0.5, 3, 0.5], [0, 0, 1], 0.5), Scaling([0.5, 1, 0.5], [2, 1, 2])]
+    bent = es.deformation.bend(binding, handles).vertices
+    for height, share in ((4, 0), (0, binding.shares[1][lower].max())):
+        one, other = ((bar.vertices == [side, height, 0]).all(axis=1) for side in (0, 1))
+        width = np.linalg.norm(bent[one] - bent[other])
+        np.testing.assert_allclose(width, 1 + share, rtol=0.1)
 
 
 def test_every_method_asks_for_one_handle_a_region():

@@ -5,7 +5,7 @@ import pytest
 
 import eigenshape as es
 from eigenshape import InvalidParameterError
-from eigenshape.features import Parcellation, parcellate, unparcellate
+from eigenshape.features import Parcellation, parcellate
 
 # Two triangles of areas 1/2 and 2: vertices weigh 1/6, 5/6, 5/6 and 2/3.
 MESH = es.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [2.5, 2.5, 0]], [[0, 1, 2], [1, 3, 2]])
@@ -21,10 +21,6 @@ def test_means_are_weighted_by_area():
     assert np.isnan(found[2])
     table = parcellate(MESH, np.column_stack([[1.0, 2, 5, 0], [2.0, 4, 10, 0]]), HALVES)
     np.testing.assert_allclose(table, np.column_stack([found, 2 * found]))
-    back = unparcellate(table, HALVES)
-    assert back.shape == (4, 2)
-    np.testing.assert_array_equal(back[:3], table[[0, 0, 1]])
-    assert np.isnan(back[3]).all()
 
 
 def test_names_and_colors_have_defaults():
@@ -68,5 +64,3 @@ def test_bad_maps_are_named():
         InvalidParameterError, match="of 4 vertices; it has 1, so it belongs to another"
     ):
         parcellate(MESH, np.ones(4), Parcellation([0]))
-    with pytest.raises(InvalidParameterError, match="one row for each of 3 parcels"):
-        unparcellate(np.ones(2), HALVES)

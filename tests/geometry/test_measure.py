@@ -13,7 +13,8 @@ from eigenshape.geometry.measure import (
     vertex_normals,
 )
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.simplices import degenerate_simplices, require_volumes
+from eigenshape.geometry.requirements import require_volumes
+from eigenshape.geometry.simplices import degenerate_simplices
 
 # The cube [0, 1]^3; its vertex 4x + 2y + z lies at (x, y, z).
 CUBE = TriangleMesh(

@@ -6,12 +6,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from eigenshape._errors import InvalidShapeError
+from eigenshape.geometry.requirements import require_volumes
 from eigenshape.geometry.simplices import (
     degenerate_simplices,
     dual_volumes,
     in_length,
     mean_side_length,
-    require_volumes,
     simplex_volumes,
 )
 from eigenshape.geometry.simplicial import SimplicialMesh

@@ -96,10 +96,16 @@ def public_names() -> dict[str, dict[str, str]]:
     return found
 
 
-# What every group may use: checks of arguments and arrays, errors, threads, kernels, files, workers
+# What every group may use: checks of arguments, arrays, matrices and meshes, vectors,
+# errors, threads, kernels, files, workers, extras
 TOOLKIT = (
     "certeig.kit.",
-    *(f"eigenshape._{name}" for name in ("arrays", "errors", "sealed", "typing", "workers")),
+    "eigenshape.geometry.conversion.",
+    "eigenshape.geometry.requirements.",
+    *(
+        f"eigenshape._{name}"
+        for name in ("arrays", "errors", "extras", "sealed", "typing", "vectors", "workers")
+    ),
 )
 
 
@@ -114,7 +120,8 @@ def private_across_walls() -> list[str]:
         {
             f"{group} {other} {each.origin}:{each.name}"
             for group, other, each in imports_across_walls()
-            if (each.origin, each.name) not in public and not each.origin.startswith(TOOLKIT)
+            if (each.origin, each.name) not in public
+            and not f"{each.origin}.{each.name}".startswith(TOOLKIT)
         }
     )
 

@@ -212,6 +212,12 @@ def height() -> np.ndarray:
     return body().vertices[:, 1].copy()
 
 
+def written_scene() -> Path:
+    """Return a file that may hold several scenes."""
+    es.write_mesh(body(), FOLDER / "scene.glb")
+    return FOLDER / "scene.glb"
+
+
 # A right value of each type; of a mesh and its kin, `body` itself.
 def written_attributes() -> es.io.MeshAttributes:
     """Return what a file of a mesh holds besides."""
@@ -338,6 +344,7 @@ NAMED: dict[str, Callable[[], Any]] = {
         "one": es.morphometrics.Landmarks(["tip"], body().vertices[:1])
     },
     "carry_attributes.attributes": written_attributes,
+    "resample_curves.n_points": lambda: 5,
     "decimate.n_faces": lambda: 100,
     "write_fields.fields": lambda: {"height": height()},
     "write_fields.path": lambda: FOLDER / "written.vtu",
@@ -426,7 +433,10 @@ NAMED: dict[str, Callable[[], Any]] = {
     "query_indexes.folders": lambda: [shelf().folder],
     "mask_surface.mask": lambda: height() > 0,
     "read_edits.path": written_edits,
+    "read_mesh.path": written_scene,
     "read_parcellation.path": written_parcels,
+    "read_shape.path": written_scene,
+    "read_surface.path": written_scene,
     "read_volume.path": written_volume,
     "structure_surfaces.labels": lambda: np.full((3, 3, 3), 11),
     "structure_surfaces.structures": lambda: {"caudate": 11},
@@ -471,7 +481,6 @@ NAMED: dict[str, Callable[[], Any]] = {
     "Parcellation.labels": lambda: [0, 1, -1],
     "Parcellation.names": lambda: ["low", "high"],
     "unmask.values": lambda: [1.0, 2.0, 3.0],
-    "unparcellate.values": lambda: [1.0, 2.0],
     "write_parcellation.path": lambda: FOLDER / "written.annot",
     "write_edits.path": lambda: FOLDER / "edits.json",
     "write_landmarks.path": lambda: FOLDER / "written.csv",

@@ -18,13 +18,13 @@ from registered_operators import function_of
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair_steps import drop_duplicate_faces
+from eigenshape.geometry.samples.spacing import neighbor_distance
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import boundary_vertices, disjoint_union
 from eigenshape.operators.anisotropic import anisotropic_laplacian, curvature_tensors
 from eigenshape.operators.catalog import OPERATORS
 from eigenshape.operators.clouds.cloud_kernel import point_cloud_laplacian
 from eigenshape.operators.clouds.gaussian import gaussian_laplacian, mesh_laplacian
-from eigenshape.operators.clouds.kernel import neighbor_distance
 from eigenshape.operators.connection import connection_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.fem import fem_boundary_nodes, fem_laplacian

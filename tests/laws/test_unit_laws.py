@@ -221,6 +221,18 @@ LAWS: dict[str, tuple[int, Callable[[Shapes], Any]]] = {
     ),
     "vertex_normals": (0, lambda s: geometry.vertex_normals(s.mesh)),
     "compare_spectra": (0, lambda s: spectral.compare_spectra(s.spectrum, s.spectrum).relative),
+    "resample_curves": (
+        1,
+        lambda s: (
+            es.morphometrics.resample_curves(
+                es.morphometrics.Landmarks(
+                    "abc", s.mesh.vertices[s.mesh.faces[0]], curves=[[0, 1, 2, 0]]
+                ),
+                9,
+                mesh=s.mesh,
+            ).points
+        ),
+    ),
     "warp_mesh": (
         1,
         lambda s: (

@@ -93,9 +93,11 @@ MADE: dict[str, Callable[[Shared], Any]] = {
     "Panel": lambda v: es.plot.Panel(v.ball, "a", np.zeros(v.ball.n_faces, int), np.arange(3)),
     "Parcellation": lambda v: v.halves,
     "PartDecomposition": lambda v: es.find_parts(v.animal),
+    "Scaling": lambda v: es.deformation.Scaling([0.5, 0, 0], [2, 1, 0.5]),
     "SpectralClusterer": lambda v: es.spectral.SpectralClusterer(3),
     "SpectralEmbedder": lambda v: es.spectral.SpectralEmbedder(3),
     "StabilityPlan": lambda v: es.stability.StabilityPlan(k=5),
+    "VectorHeat": lambda v: es.calculus.prepare_vector_heat(es.PointCloud(v.ball.vertices, dim=2)),
     "Workers": lambda v: es.retrieval.Workers(2),
 }
 # What may change inside values.

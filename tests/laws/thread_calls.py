@@ -321,6 +321,9 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "Rotation.carry": lambda v: v.handle.carry(
         v.ball.vertices, np.linspace(0, 1, v.ball.n_vertices)
     ),
+    "Scaling.carry": lambda v: es.deformation.Scaling([0.1, 0, 0], [2, 1, 0.5]).carry(
+        v.ball.vertices, np.linspace(0, 1, v.ball.n_vertices)
+    ),
     "Translation.carry": lambda v: v.move.carry(
         v.ball.vertices, np.linspace(0, 1, v.ball.n_vertices)
     ),
@@ -346,7 +349,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "structure_surfaces": lambda v: es.modes.structure_surfaces(v.label_image, structures={"a": 3}),
     "voxel_surface": lambda v: es.calculus.voxel_surface(v.label_image == 2),
     "unmask": lambda v: es.geometry.unmask(v.heat, np.arange(v.animal.n_vertices), 900),
-    "unparcellate": lambda v: es.features.unparcellate([1.0, 2.0], v.halves),
     "write_parcellation": lambda v: written(
         v.folder, ".annot", lambda path: es.io.write_parcellation(v.animal, path, v.halves)
     ),
@@ -697,6 +699,11 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         v.skulls[:, :60], curves=[range(20)]
     ),
     "principal_components": lambda v: es.morphometrics.principal_components(v.skulls),
+    "resample_curves": lambda v: es.morphometrics.resample_curves(
+        es.morphometrics.Landmarks("abc", v.ball.vertices[v.ball.faces[0]], curves=[[0, 1, 2, 0]]),
+        9,
+        mesh=v.ball,
+    ),
     "symmetric_components": lambda v: es.morphometrics.symmetric_components(v.skulls, [[0, 1]]),
     "warp_mesh": lambda v: es.morphometrics.warp_mesh(
         v.animal, v.animal.vertices[:20], v.pose.vertices[:20]

@@ -2,7 +2,12 @@
 
 import numpy as np
 
-from eigenshape.matching.fitting_loops import add_pulls, add_tensions, turn_frames
+from eigenshape.matching.fitting_loops import (
+    add_forces,
+    carry_vertices,
+    fill_stiffness,
+    turn_frames,
+)
 
 M, E = 5, 40
 
@@ -58,8 +63,7 @@ def test_pulls_and_tensions_are_those_of_sums():
     offsets, targets = rng.standard_normal((30, 4, 3)), rng.standard_normal((30, 3))
     pull = rng.random(30)
     found = np.zeros((M, 3))
-    add_pulls(turns, carriers, portions, offsets, pull, targets, found)
-    add_tensions(turns, one, two, arms, 0.7, found)
+    add_forces(turns, carriers, portions, offsets, pull, targets, one, two, arms, 0.7, found)
     turned = np.einsum("scij,scj->sci", turns[carriers], offsets)
     rest = targets - np.einsum("sc,sci->si", portions, turned)
     wanted = np.zeros((M, 3))
@@ -67,3 +71,41 @@ def test_pulls_and_tensions_are_those_of_sums():
     between = 0.5 * (turns[one] + turns[two])
     np.add.at(wanted, one, -0.7 * np.einsum("eij,ej->ei", between, arms))
     assert np.allclose(found, wanted)
+
+
+def test_the_matrix_of_a_bend_is_a_sum_over_samples_and_edges():
+    rng = np.random.default_rng(3)
+    carriers = np.array([rng.permutation(M)[:4] for _ in range(30)])
+    portions, pull, graph = rng.random((30, 4)), rng.random(30), rng.random((M, M))
+    graph += graph.T
+    found = np.full((M, M), np.nan)
+    fill_stiffness(carriers, portions, pull, graph, 0.3, 1e-3, found)
+    shares = np.zeros((30, M))
+    np.put_along_axis(shares, carriers, portions, axis=1)
+    wanted = shares.T @ (pull[:, None] * shares) + 0.3 * graph + 1e-3 * np.eye(M)
+    lower = np.tril_indices(M)
+    assert np.allclose(found[lower], wanted[lower])
+    assert np.isnan(found[np.triu_indices(M, 1)]).all()
+
+
+def test_frames_carry_vertices_by_their_portions():
+    rng = np.random.default_rng(4)
+    vertices, normals = rng.standard_normal((2, 30, 3))
+    frames, turns, places = (
+        rng.permutation(30)[:M],
+        rng.standard_normal((M, 3, 3)),
+        rng.random((M, 3)),
+    )
+    carriers, portions = rng.integers(0, M, (30, 4)), rng.random((30, 4))
+    chosen = np.array([7, 2, 29])
+    points, turned = np.empty((2, 3, 3))
+    part = vertices, normals, frames, carriers, portions
+    carry_vertices(turns, places, part, chosen, points, turned)
+    for place, v in enumerate(chosen):
+        wanted, normal = np.zeros((2, 3))
+        for frame, share in zip(carriers[v], portions[v], strict=True):
+            arm = vertices[v] - vertices[frames[frame]]
+            wanted += share * (places[frame] + turns[frame] @ arm)
+            normal += share * turns[frame] @ normals[v]
+        assert np.allclose(points[place], wanted)
+        assert np.allclose(turned[place], normal / np.linalg.norm(normal))

@@ -8,6 +8,7 @@ import pytest
 import eigenshape as es
 from eigenshape.morphometrics.landmark_files import LENGTHS, OF_ONE, WRITERS
 
+HOLD_POINTS = [suffix for suffix in WRITERS if suffix != ".sliders.csv"]  # which has rows alone
 NAMES = ("nasion", "left, upper", "rand", "x", "y")
 CURVES = ((0, 3, 4), (1, 2, 4, 1))
 
@@ -44,7 +45,7 @@ def same(one, two):
     return exact and one.names == two.names and one.curves == two.curves
 
 
-@pytest.mark.parametrize("suffix", WRITERS)
+@pytest.mark.parametrize("suffix", HOLD_POINTS)
 def test_landmarks_come_back_to_the_last_bit(suffix, tmp_path):
     path = tmp_path / f"A skull{suffix}"
     es.morphometrics.write_landmarks(specimen(), path)
@@ -52,7 +53,7 @@ def test_landmarks_come_back_to_the_last_bit(suffix, tmp_path):
     assert list(es.morphometrics.read_specimens(path)) == ["A skull"]
 
 
-@pytest.mark.parametrize("suffix", [each for each in WRITERS if each not in OF_ONE])
+@pytest.mark.parametrize("suffix", [each for each in HOLD_POINTS if each not in OF_ONE])
 def test_several_specimens_come_back_in_their_order(suffix, tmp_path):
     path = tmp_path / f"all{suffix.upper()}"
     given = {"b = 1": specimen(1), "a": specimen(2), 'c "x", y': specimen(3)}
@@ -274,8 +275,8 @@ def test_points_in_a_plane_are_read_and_named(tmp_path):
     with pytest.warns(UserWarning, match="in a plane and are read with z = 0"):
         found = read("a.tps", f"LM=3\n{corner}ID=a\nLM=3\n{mirrored}ID=b\n", tmp_path)
     assert found["a"].points.tolist() == [[0, 0, 0], [3, 0, 0], [0, 1, 0]]
-    # What the warning says of mirror images:
-    assert es.morphometrics.fit_procrustes(found).distances().max() < 1e-7
+    # A planar form is not its mirror image.
+    assert es.morphometrics.fit_procrustes(found).distances().max() > 0.1
     with pytest.warns(UserWarning, match="in a plane"):
         found = read("a.nts", f"1 3 2 0 DIM=2\n{corner}", tmp_path)["a"]
     assert found.points.tolist() == [[0, 0, 0], [3, 0, 0], [0, 1, 0]]
@@ -385,7 +386,10 @@ def test_a_wrong_file_is_refused_with_what_is_wrong(name, tmp_path):
         es.morphometrics.read_specimens(path)
 
 
-@pytest.mark.parametrize("suffix", WRITERS)
+OF_POINTS = [each for each in WRITERS if each != ".sliders.csv"]  # which holds no places
+
+
+@pytest.mark.parametrize("suffix", OF_POINTS)
 def test_a_file_that_is_cut_is_refused_or_holds_the_specimens_that_are_whole(suffix, tmp_path):
     given = {"only": specimen()} if suffix in OF_ONE else {"one": specimen(), "two": specimen(1)}
     whole = {name: kept(each, suffix) for name, each in given.items()}

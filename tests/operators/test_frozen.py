@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from certeig.matrices import freeze_sparse
+from certeig.kit.matrices import freeze_sparse
 
 
 def test_a_frozen_matrix_computes_and_does_not_change():

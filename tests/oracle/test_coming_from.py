@@ -269,7 +269,10 @@ def names_for_geomorph(folder: Path) -> dict[str, Any]:
     normals = np.full(A.shape, np.nan)
     normals[:, 6:] = es.geometry.vertex_normals(mesh)[::20][6:]
     names = [str(number + 1) for number in range(k)]
-    mice = {"AKR": morpho.Landmarks(names, A[0]), "DBA": morpho.Landmarks(names, A[1])}
+    mice = {
+        mouse: morpho.Landmarks(names, own, curves=[range(6)])
+        for mouse, own in zip(("AKR", "DBA"), A, strict=False)
+    }
     paths = {}
     for name, suffix in (("tps", ".tps"), ("morphologika", ".txt"), ("fcsv", ".fcsv")):
         paths[f"{name}_path"] = folder / f"mice{suffix}"
@@ -298,6 +301,9 @@ def names_for_geomorph(folder: Path) -> dict[str, Any]:
             "points": points,
             "broken": broken,
             "curves": [[0, 1, 2, 3, 4, 5]],
+            "surfaces": [6, 7, 8],
+            "template": mice["AKR"],
+            "sliders_path": folder / "mice.sliders.csv",
             "normals": normals,
             "groups": np.array(list("aaabbbcc")),
             "land_pairs": [[0, 1], [2, 3]],

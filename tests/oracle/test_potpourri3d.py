@@ -4,6 +4,7 @@ import numpy as np
 import potpourri3d as pp3d
 import pytest
 
+import eigenshape as es
 from eigenshape.calculus.geodesic_paths import geodesic_path
 from eigenshape.calculus.geodesic_rays import trace_geodesic
 from eigenshape.calculus.heat_distance import heat_distances, prepare_heat_geodesics
@@ -158,3 +159,20 @@ def cap_loop(ball: TriangleMesh) -> list[int]:
     cap = TriangleMesh(ball.vertices, ball.faces[(ball.vertices[ball.faces, 2] > 0.4).all(axis=1)])
     loop = boundary_loops(cap)[0].tolist()
     return [*loop, loop[0]]
+
+
+def test_walks_from_points_inside_faces_are_theirs():
+    ball = es.icosphere(3)
+    mesh = es.TriangleMesh(ball.vertices * [1, 1.2, 0.8], ball.faces)
+    tracer = pp3d.GeodesicTracer(np.array(mesh.vertices), np.array(mesh.faces))
+    rng = np.random.default_rng(0)
+    for number in range(40):
+        start = es.geometry.sample_surface(mesh, 1, rng=rng)
+        face, weights, vector = int(start.simplices[0]), start.weights[0], rng.uniform(-1, 1, 2)
+        one, two, three = mesh.vertices[mesh.faces[face]]
+        x = (two - one) / np.linalg.norm(two - one)
+        normal = np.cross(x, three - one)
+        y = np.cross(normal / np.linalg.norm(normal), x)
+        theirs = tracer.trace_geodesic_from_face(face, weights.tolist(), vector @ [x, y])
+        ours = es.calculus.trace_geodesic(mesh, start, vector)
+        np.testing.assert_allclose(ours.points[-1], theirs[-1], atol=1e-10, err_msg=str(number))

@@ -4,7 +4,8 @@ import pytest
 from certeig.kit.errors import InvalidParameterError
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.measure import enclosed_volume, face_normals
-from eigenshape.geometry.simplices import require_volumes, simplex_volumes
+from eigenshape.geometry.requirements import require_volumes
+from eigenshape.geometry.simplices import simplex_volumes
 from eigenshape.geometry.topology import (
     boundary_vertices,
     is_closed,

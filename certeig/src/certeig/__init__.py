@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from certeig.sparse.symmetric_factor import SymmetricFactor
     from certeig.spectrum import Spectrum
 
-__version__ = "1.0.0rc1"
+__version__ = "1.0.0"
 __all__ = [
     "CerteigError",
     "Certificate",

@@ -4,15 +4,15 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Float, Int
+from jaxtyping import Int
 
 from certeig.certificate import Certificate
-from certeig.kit.arrays import finite_number, freeze, whole_number
+from certeig.kit.arrays import as_interval, finite_number, freeze, whole_number
 from certeig.kit.errors import ConvergenceError, InvalidParameterError
+from certeig.kit.matrices import as_symmetric, on_all_rows, require_points
 from certeig.kit.progress import Progress, silent
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike, Integer
-from certeig.matrices import as_symmetric, on_all_rows, require_points
 from certeig.solver.certified import certified_pairs
 from certeig.solver.certify import certify_pairs, in_user_units
 from certeig.solver.inertia import count_below_shift
@@ -109,7 +109,7 @@ def eigenpairs(  # noqa: PLR0913 - one keyword for each choice of pairs
     free = _free_unknowns(fixed, stiffness.shape[0])
     if free is not None:
         stiffness, mass = stiffness[free][:, free], mass[free][:, free]
-    interval = _interval(k, above, below)
+    interval = as_interval(k, above, below, finite_number)
     wanted = 0 if k is None else whole_number(k, "k", 1, stiffness.shape[0])
     report = progress or silent
     with one_blas_thread():
@@ -292,25 +292,3 @@ def _free_unknowns(fixed: ArrayLike | None, n: int) -> Int[np.ndarray, " f"] | N
     if not free.size:
         raise InvalidParameterError(f"At least one unknown must be free; all {n} are fixed.")
     return free
-
-
-def _interval(
-    k: Integer | None, above: float | None, below: float | None
-) -> Float[np.ndarray, " 2"]:
-    if (k is None) == (below is None):
-        raise InvalidParameterError(
-            f"Exactly one of k and below must be given; k is {k} and below is {below}."
-        )
-    if below is None:
-        if above is not None:
-            raise InvalidParameterError(
-                f"above needs below, the other end of an interval; above is {above}."
-            )
-        return np.zeros(2)
-    high = finite_number(below, "below")
-    low = -np.inf if above is None else finite_number(above, "above")
-    if low >= high:
-        raise InvalidParameterError(
-            f"above must be less than below; above is {above} and below is {below}."
-        )
-    return np.array([low, high])

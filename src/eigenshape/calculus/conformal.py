@@ -5,18 +5,19 @@ import scipy.sparse as sp
 from jaxtyping import Complex, Float, Int
 from scipy.sparse.linalg import spsolve
 
-from certeig.kit.arrays import real_numbers
+from certeig.kit.arrays import EPS, real_numbers
 from certeig.kit.errors import ConvergenceError, InvalidParameterError
 from certeig.kit.progress import Progress, silent
 from certeig.kit.typing import ArrayLike, Integer
 from eigenshape._arrays import require_finite_rows, step_number
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import size_one, triangle_areas
 from eigenshape.calculus.linear_solver import LinearSolver, factor_definite
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.measure import face_areas, scale_to_unit, triangle_areas
+from eigenshape.geometry.measure import face_areas, scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_oriented, require_sound
-from eigenshape.geometry.simplices import scaled_corners, size_one, triangular_sides
+from eigenshape.geometry.simplices import scaled_corners, triangular_sides
 from eigenshape.geometry.topology import (
     boundary_edges,
     euler_characteristic,
@@ -46,7 +47,7 @@ ROUND = 0.3
 # head of 10,540 faces needs two.
 MOST_ROUNDS = 8
 # Height of a triangle on the unit sphere, below which rounding decides how it lies.
-ROUNDING = 4 * np.finfo(np.float64).eps
+ROUNDING = 4 * EPS
 
 
 def flatten_conformally(mesh: MeshLike) -> Float[np.ndarray, "n 2"]:

@@ -5,15 +5,15 @@ import scipy.sparse as sp
 
 from certeig.kit.arrays import finite_number, positive_number
 from certeig.kit.errors import InvalidParameterError
+from certeig.kit.matrices import require_points
 from certeig.kit.progress import Progress, silent
 from certeig.kit.typing import ArrayLike, Integer
-from certeig.matrices import require_points
 from eigenshape._arrays import step_number
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import size_one
 from eigenshape.calculus.linear_solver import factor_definite
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.simplices import size_one
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.geometry.topology import boundary_vertices
 from eigenshape.operators.cotangent import cotangent_laplacian

@@ -1,13 +1,14 @@
 """Geodesic paths: locally shortest between two vertices."""
 
 from cmath import phase
+from collections.abc import Mapping
 from itertools import pairwise
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import dijkstra
 
-from certeig.kit.arrays import whole_number, whole_numbers
+from certeig.kit.arrays import whole_numbers
 from certeig.kit.errors import ConvergenceError, InvalidParameterError
 from certeig.kit.typing import ArrayLike, Integer
 from eigenshape.calculus.unfolding import (
@@ -23,9 +24,16 @@ from eigenshape.calculus.unfolding import (
     walkable_sides,
 )
 from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.geometry.distances.closest import closest_points
 from eigenshape.geometry.measure import edge_lengths, scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_sound
+from eigenshape.geometry.samples.surface_points import (
+    SurfacePoints,
+    require_on,
+    require_one,
+    vertex_number,
+)
 from eigenshape.geometry.topology import edge_table
 from eigenshape.operators.directions import (
     require_oriented_manifold,
@@ -34,14 +42,21 @@ from eigenshape.operators.directions import (
 # Rounds in which pivots are passed on their other side; a path of k edges takes about √k.
 ROUNDS = 10_000
 
+# A point with a smaller weight at a corner is moved to the opposite side: slivers have no angles.
+ON_SIDE = 1e-6
+
 # The left and the right end of each edge that a strip of faces crosses, in the plane.
 Portals = list[tuple[complex, complex]]
 
 
 def geodesic_path(
-    mesh: MeshLike, start: Integer, end: Integer, *, via: ArrayLike = ()
+    mesh: MeshLike,
+    start: Integer | SurfacePoints,
+    end: Integer | SurfacePoints,
+    *,
+    via: ArrayLike = (),
 ) -> GeodesicPath:
-    """Find a locally shortest path between two vertices.
+    """Find a locally shortest path between two vertices, or points inside faces.
 
     The shortest path along edges is the start. The strip of faces beside it is unfolded, where the
     shortest path is a taut string; each vertex on which the string bends is passed on its other
@@ -54,8 +69,8 @@ def geodesic_path(
     ----------
     mesh : MeshLike
         A manifold, with or without boundary, with consistently oriented faces.
-    start, end : int
-        Vertices.
+    start, end : int or SurfacePoints
+        Vertices, or one point each, such as `closest_points` finds.
     via : (k,) int
         Vertices that the path along edges passes on its way. They choose the side of a hill or
         handle; the path is then straightened as a whole, and leaves them.
@@ -70,8 +85,8 @@ def geodesic_path(
         If the mesh is no manifold, two neighboring faces are turned against each other, a face has
         no area, or a vertex has no face.
     InvalidParameterError
-        If a vertex is out of range, two that follow each other are equal, or they lie on different
-        components.
+        If a vertex is out of range, a point does not lie on this mesh or is not one, two stops that
+        follow each other are equal, or they lie on different components.
     ConvergenceError
         If moves do not end, which they do.
 
@@ -89,16 +104,21 @@ def geodesic_path(
     >>> path = es.calculus.geodesic_path(cube, 0, 7)
     >>> round(path.length, 6)  # √5
     2.236068
+
+    Between points in the middle of two faces:
+
+    >>> ends = es.geometry.closest_points(cube, [[0.5, 0.5, 1], [0.5, 1, 0.5]])
+    >>> start, end = (es.geometry.closest_points(cube, [place]) for place in ends.points)
+    >>> round(es.calculus.geodesic_path(cube, start, end).length, 6)
+    1.0
     """
     mesh = as_mesh(mesh)
     require_sound(mesh)
     require_oriented_manifold(mesh)
     last = mesh.n_vertices - 1
-    stops = [
-        whole_number(start, "start", 0, last),
-        *(whole_numbers(via, "A vertex of via", 0, last).tolist() if np.size(via) else ()),
-        whole_number(end, "end", 0, last),
-    ]
+    between = whole_numbers(via, "A vertex of via", 0, last).tolist() if np.size(via) else []
+    mesh, (first, final) = _insert_stops(mesh, {"start": start, "end": end})
+    stops = [first, *between, final]
     # The shortest path along edges through all stops.
     graph = sp.coo_array(
         (edge_lengths(mesh), edge_table(mesh).edges.T), shape=(mesh.n_vertices,) * 2
@@ -123,7 +143,6 @@ def geodesic_path(
     unit = TriangleMesh(scale_to_unit(mesh)[0], mesh.faces)
     sides = walkable_sides(unit)
     strip = _strip_along(sides, path)
-    first, final = stops[0], stops[-1]
     for _ in range(ROUNDS):
         # Drop what the strip crosses before it leaves the first vertex and after it meets the last.
         starts = [place for place, side in enumerate(strip) if _touches(sides, side, first)]
@@ -153,6 +172,40 @@ def geodesic_path(
         if stop < len(portals) - 1:
             points.append(point_on_side(mesh, sides, strip[stop - 1], 1.0 - last_end))
     return as_path(np.array([*points, mesh.vertices[final]]))
+
+
+def _insert_stops(
+    mesh: TriangleMesh, stops: Mapping[str, Integer | SurfacePoints]
+) -> tuple[TriangleMesh, list[int]]:
+    """Return the vertex of each stop, a vertex or one point on the mesh, which becomes a vertex.
+
+    The faces at a point are split, and the vertices of the mesh stay the first ones. Raise
+    InvalidParameterError if a stop is not on the mesh; its name is that of the argument.
+    """
+    points, faces, origin = mesh.vertices, mesh.faces, np.arange(mesh.n_faces)
+    vertices = []
+    for name, stop in stops.items():
+        if not isinstance(stop, SurfacePoints):
+            vertices.append(vertex_number(mesh.n_vertices, stop, name))
+            continue
+        require_one(stop, name)
+        require_on(mesh, stop, name)
+        # The point before may have split the face: look in each piece.
+        pieces = faces[origin == stop.simplices[0]]
+        there = closest_points(TriangleMesh(points, pieces), stop.points)
+        corners = pieces[there.simplices[0], there.weights[0] > ON_SIDE]
+        if len(corners) == 1:
+            vertices.append(int(corners[0]))
+            continue
+        # Each face at that side becomes one for each corner of the side, with the point instead.
+        split = np.flatnonzero(np.isin(faces, corners).sum(axis=1) == len(corners))
+        whole = faces[split]
+        new = [np.where(whole == corner, len(points), whole) for corner in corners]
+        faces = np.concatenate([np.delete(faces, split, axis=0), *new])
+        origin = np.concatenate([np.delete(origin, split), np.tile(origin[split], len(corners))])
+        vertices.append(len(points))
+        points = np.append(points, stop.points, axis=0)
+    return TriangleMesh(points, faces), vertices
 
 
 def _strip_along(sides: Sides, path: list[int]) -> list[int]:

@@ -9,6 +9,7 @@ from certeig.kit.errors import InvalidParameterError
 from certeig.kit.progress import Progress, silent
 from certeig.kit.typing import ArrayLike
 from certeig.sparse.symmetric_factor import SymmetricFactor
+from eigenshape._vectors import size_one
 from eigenshape.calculus.linear_solver import (
     GroundedFactor,
     factorize_definite,
@@ -19,7 +20,7 @@ from eigenshape.geometry.conversion import ShapeLike, as_shape
 from eigenshape.geometry.distances.geodesic import source_sets
 from eigenshape.geometry.homology import edges_of
 from eigenshape.geometry.requirements import require_sound
-from eigenshape.geometry.simplices import in_length, simplex_volumes, size_one
+from eigenshape.geometry.simplices import in_length, simplex_volumes
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.operators import elements, flip_loops
 from eigenshape.operators.clouds.cloud_triangles import cloud_cover

@@ -11,12 +11,12 @@ from certeig.kit.errors import InvalidParameterError
 from certeig.kit.progress import Progress, silent
 from certeig.kit.typing import ArrayLike
 from eigenshape._arrays import require_finite_rows
+from eigenshape._vectors import area_vectors
 from eigenshape.calculus.derivatives import sum_at_nodes
 from eigenshape.calculus.linear_solver import factorize_grounded
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.facets import facet_table
 from eigenshape.geometry.homology import betti_numbers
-from eigenshape.geometry.measure import area_vectors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplices import scaled_corners

@@ -8,9 +8,10 @@ from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike
 from eigenshape._arrays import point_functions, vertex_values
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import size_one
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.simplices import cut_tetrahedra, in_length, size_one, volumes
+from eigenshape.geometry.simplices import cut_tetrahedra, in_length, volumes
 
 
 @record

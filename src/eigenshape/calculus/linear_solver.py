@@ -10,9 +10,9 @@ from scipy.sparse.csgraph import connected_components
 
 from certeig.kit.arrays import ReadOnly, real_numbers, record
 from certeig.kit.errors import InvalidParameterError
+from certeig.kit.matrices import as_symmetric, find_zero_row_sums, require_points
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike
-from certeig.matrices import as_symmetric, find_zero_row_sums, require_points
 from certeig.sparse.symmetric_factor import SymmetricFactor, factor_matrix
 from eigenshape._arrays import point_functions, require_finite_rows
 from eigenshape._errors import InvalidShapeError

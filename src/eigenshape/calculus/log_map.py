@@ -8,10 +8,12 @@ from jaxtyping import Complex, Float
 from certeig.kit.arguments import require_choice
 from certeig.kit.arrays import whole_number
 from certeig.kit.typing import Integer
+from eigenshape.calculus.unfolding import flat_corners
 from eigenshape.calculus.vector_heat import (
+    MeshVectorHeat,
     VectorHeat,
+    as_mesh_heat,
     as_rows,
-    as_vector_heat,
     diffuse,
     edge_sums,
     integrate_along_edges,
@@ -20,7 +22,13 @@ from eigenshape.calculus.vector_heat import (
     scalar_impulse,
     side_vectors,
 )
-from eigenshape.geometry.conversion import MeshLike
+from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.geometry.samples.surface_points import (
+    SurfacePoints,
+    require_on,
+    require_one,
+    vertex_number,
+)
 from eigenshape.geometry.simplices import in_length
 from eigenshape.operators.directions import corner_products
 from eigenshape.operators.tufted import side_ends
@@ -29,9 +37,9 @@ LogMethod = Literal["affine", "adaptive", "radial"]
 
 
 def logarithmic_map(
-    mesh: MeshLike | VectorHeat, source: Integer, *, method: LogMethod = "affine"
+    mesh: MeshLike | VectorHeat, source: Integer | SurfacePoints, *, method: LogMethod = "affine"
 ) -> Float[np.ndarray, "n 2"]:
-    """Compute the logarithmic map at a vertex: polar coordinates of all vertices around it.
+    """Compute the logarithmic map at a vertex or point: polar coordinates of all vertices around it.
 
     The length of each result is the geodesic distance from the source, its angle the direction in
     which the shortest path leaves the source.
@@ -40,8 +48,8 @@ def logarithmic_map(
     ----------
     mesh : MeshLike or VectorHeat
         `prepare_vector_heat(mesh)` keeps the factors for further calls.
-    source : int
-        Vertex.
+    source : int or SurfacePoints
+        Vertex, or one point, such as `closest_points` finds.
     method : {"affine", "adaptive", "radial"}
         "affine": heat of affine coordinates in the frames of all vertices, the most accurate on
         the nearer half of a sphere. "adaptive": the same in one frame that is transported from the
@@ -53,14 +61,15 @@ def logarithmic_map(
     Returns
     -------
     (n, 2) float
-        Coordinates in the frame of the source, the row of `operators.tangent_frames`, in length.
+        Coordinates in the frame of the source, in length: of a vertex the row of
+        `operators.tangent_frames`, of a point x along the first side of its face.
         The source is at 0 for "radial", and within rounding of it on flat regions for the others.
 
     Raises
     ------
     InvalidParameterError
-        If the source is not a vertex, a component does not contain it, heat is too small for a
-        float somewhere, or `method` is not one of the three.
+        If the source is not a vertex or one point of this mesh, a component does not contain it, heat
+        is too small for a float somewhere, or `method` is not one of the three.
     InvalidShapeError
         As in `prepare_vector_heat`.
 
@@ -83,8 +92,10 @@ def logarithmic_map(
     True
     """
     require_choice(method, LogMethod, "method")
-    solver = as_vector_heat(mesh)
-    start = whole_number(source, "source", 0, solver.n_points - 1)
+    if isinstance(source, SurfacePoints):
+        return _map_at(mesh, source, method)
+    solver = as_mesh_heat(mesh)
+    start = vertex_number(solver.n_points, source, "source")
     require_source_everywhere(solver, np.array([start]))
     weight = scalar_impulse(solver, start)
     impulse = np.zeros(solver.n_points, dtype=complex)
@@ -119,7 +130,32 @@ def logarithmic_map(
     return in_length(as_rows(found), solver.scale, 1)
 
 
-def _outward_field(solver: VectorHeat, start: int) -> Complex[np.ndarray, " n"]:
+def _map_at(
+    mesh: MeshLike | VectorHeat, place: SurfacePoints, method: LogMethod
+) -> Float[np.ndarray, "n 2"]:
+    """Average the maps at the corners of a face, moved and turned to a point of it.
+
+    That is exact in a plane, and on a curved surface up to the square of the size of the face.
+    """
+    solver = as_mesh_heat(mesh)
+    require_one(place, "source")
+    if not isinstance(mesh, VectorHeat):  # which has no coordinates to compare with
+        require_on(as_mesh(mesh), place, "source")
+    n_faces = solver.mesh.n_faces
+    face = whole_number(place.simplices[0], "The face of source", 0, n_faces - 1)
+    flat = flat_corners(solver.mesh.vertices[solver.mesh.faces[face]])
+    offsets = flat - place.weights[0] @ flat
+    found = np.zeros(solver.n_points, dtype=complex)
+    for corner, vertex in enumerate(solver.mesh.faces[face]):
+        way = np.angle(flat[(corner + 1) % 3] - flat[corner])
+        turn = np.exp(1j * (way - solver.directions.at_tail[3 * face + corner]))
+        rows = logarithmic_map(solver, vertex, method=method) / solver.scale
+        own = turn * (rows[:, 0] + 1j * rows[:, 1]) + offsets[corner]
+        found += place.weights[0, corner] * own
+    return in_length(as_rows(found), solver.scale, 1)
+
+
+def _outward_field(solver: MeshVectorHeat, start: int) -> Complex[np.ndarray, " n"]:
     """Integrate the unit field that points away from a vertex against the hat functions around it.
 
     The integrals over each face are exact (Sharp, Soliman, Crane 2019, appendix A).

@@ -10,7 +10,7 @@ from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike
 from eigenshape.calculus.vector_heat import (
     VectorHeat,
-    as_vector_heat,
+    as_mesh_heat,
     diffuse,
     edge_sums,
     integrate_along_edges,
@@ -80,7 +80,7 @@ def signed_heat_distance(
     >>> bool(abs(distance - (square.vertices[:, 0] - 0.5)).max() < 1e-12)
     True
     """
-    solver = as_vector_heat(mesh)
+    solver = as_mesh_heat(mesh)
     n, directions, faces = solver.n_points, solver.directions, solver.mesh.faces
     if not len(curves):
         raise InvalidParameterError("There must be at least one curve; there is none.")

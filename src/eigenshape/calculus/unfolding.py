@@ -1,12 +1,13 @@
 """Faces laid flat one after another, for paths that cross them straight."""
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Complex, Float, Int
 
 from certeig.kit.arrays import ReadOnly, record
+from eigenshape._vectors import size_one
 from eigenshape.geometry.curvature import face_angles
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.simplices import in_length, size_one
+from eigenshape.geometry.simplices import in_length
 from eigenshape.operators.directions import side_twins
 from eigenshape.operators.tufted import side_ends
 
@@ -72,6 +73,14 @@ def walkable_sides(mesh: TriangleMesh) -> Sides:
         zip(zip(tails.tolist(), heads.tolist(), strict=True), range(len(tails)), strict=True)
     )
     return Sides(mesh.vertices, tails, heads, side_twins(mesh), lengths, angles, around, of_edge)
+
+
+def flat_corners(corners: Float[np.ndarray, "3 3"]) -> Complex[np.ndarray, "3"]:
+    """Lay a face in the plane of its frame, with its first corner at 0 and its first side along x."""
+    sides = corners[1:] - corners[0]
+    length = np.linalg.norm(sides[0])
+    apex = sides[0] @ sides[1] + 1j * np.linalg.norm(np.cross(sides[0], sides[1]))
+    return np.array([0, length, apex / length])
 
 
 def next_side(side: int) -> int:

@@ -1,6 +1,7 @@
 """Parallel transport and scalar extension by short heat flow."""
 
 import numpy as np
+import scipy.sparse as sp
 from jaxtyping import Complex, Float, Int
 
 from certeig.kit.arrays import ReadOnly, finite_values, positive_number, real_numbers, record
@@ -9,12 +10,14 @@ from certeig.kit.progress import Progress, silent
 from certeig.kit.typing import ArrayLike
 from certeig.sparse.symmetric_factor import SymmetricFactor
 from eigenshape._arrays import require_finite_rows
+from eigenshape._vectors import size_one
 from eigenshape.calculus.heat_distance import require_heat, require_sources
 from eigenshape.calculus.linear_solver import (
     GroundedFactor,
     factorize_definite,
     factorize_grounded,
 )
+from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import edge_lengths, scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
@@ -22,6 +25,7 @@ from eigenshape.geometry.simplices import in_length
 from eigenshape.operators.connection import connection_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.directions import Directions, half_cotangents, vertex_directions
+from eigenshape.operators.robust import robust_laplacian
 from eigenshape.operators.tufted import side_ends
 
 
@@ -37,10 +41,6 @@ class VectorHeat(ReadOnly):
         Time t of the heat, in length².
     scale : float
         A power of two, the size of the coordinates, in length.
-    mesh : TriangleMesh
-        The surface, scaled.
-    directions : Directions
-        Angles of all sides in the tangent planes of their ends.
     components : (n,) int
         Connected component of each vertex.
     scalar_heat, vector_heat : SymmetricFactor
@@ -64,8 +64,6 @@ class VectorHeat(ReadOnly):
 
     time: float
     scale: float
-    mesh: TriangleMesh
-    directions: Directions
     components: Int[np.ndarray, " n"]
     scalar_heat: SymmetricFactor
     vector_heat: SymmetricFactor
@@ -74,23 +72,35 @@ class VectorHeat(ReadOnly):
     @property
     def n_points(self) -> int:
         """Number of vertices n."""
-        return self.mesh.n_vertices
+        return len(self.components)
 
     def __repr__(self) -> str:
         return f"VectorHeat({self.n_points} points, time={self.time:.4g})"
 
 
+@record
+class MeshVectorHeat(VectorHeat):
+    """A mesh that is ready: the mesh, scaled, and the angles of its sides in their tangent planes."""
+
+    mesh: TriangleMesh
+    directions: Directions
+
+    __repr__ = VectorHeat.__repr__
+
+
 def prepare_vector_heat(
-    mesh: MeshLike, *, time_factor: float = 1.0, progress: Progress | None = None
+    mesh: MeshLike | PointCloud, *, time_factor: float = 1.0, progress: Progress | None = None
 ) -> VectorHeat:
     """Factor the equations of transport by heat, to be used for any number of sources.
 
     Parameters
     ----------
-    mesh : MeshLike
-        A manifold, with or without boundary, with consistently oriented faces.
+    mesh : MeshLike or PointCloud
+        A manifold, with or without boundary, with consistently oriented faces; or points of a surface
+        in R³.
     time_factor : float
-        The heat flows for the time t = time_factor × h², with the mean edge length h.
+        The heat flows for the time t = time_factor × h², with the mean edge length h; of a point
+        cloud that of `robust_laplacian`.
     progress : callable, optional
         Called as progress(fraction_done, message).
 
@@ -117,15 +127,22 @@ def prepare_vector_heat(
     >>> es.calculus.logarithmic_map(solver, 0).shape
     (162, 2)
     """
-    mesh = as_mesh(mesh)
     factor = positive_number(time_factor, "time_factor")
-    points, scale = scale_to_unit(mesh)
-    unit = TriangleMesh(points, mesh.faces)
     report_progress = progress or silent
     report_progress(0.0, "operators")
-    connection = connection_laplacian(unit)
-    scalar = cotangent_laplacian(unit)
-    time = factor * float(edge_lengths(unit).mean()) ** 2
+    if isinstance(mesh, PointCloud):
+        points, scale = size_one(mesh.points)
+        cloud = PointCloud(points, dim=mesh.dim)
+        scalar, connection = robust_laplacian(cloud), connection_laplacian(cloud)
+        one, two = sp.triu(scalar.stiffness, 1).nonzero()
+        lengths = np.linalg.norm(points[one] - points[two], axis=1)
+    else:
+        mesh = as_mesh(mesh)
+        points, scale = scale_to_unit(mesh)
+        unit = TriangleMesh(points, mesh.faces)
+        scalar, connection = cotangent_laplacian(unit), connection_laplacian(unit)
+        lengths = edge_lengths(unit)
+    time = factor * float(lengths.mean()) ** 2
     # Shares of the time on a sphere of 50,000 vertices.
     report_progress(0.3, "factors for functions")
     scalar_heat = factorize_definite(scalar.mass + time * scalar.stiffness)
@@ -133,20 +150,15 @@ def prepare_vector_heat(
     report_progress(0.6, "factor for vectors")
     vector_heat = factorize_definite(connection.mass + time * connection.stiffness)
     report_progress(1.0, "prepared")
-    return VectorHeat(
-        float(in_length(np.array([time]), scale, 2)[0]),
-        scale,
-        unit,
-        vertex_directions(unit),
-        poisson.components,
-        scalar_heat,
-        vector_heat,
-        poisson,
-    )
+    length_squared = float(in_length(np.array([time]), scale, 2)[0])
+    prepared = (length_squared, scale, poisson.components, scalar_heat, vector_heat, poisson)
+    if isinstance(mesh, PointCloud):
+        return VectorHeat(*prepared)
+    return MeshVectorHeat(*prepared, unit, vertex_directions(unit))
 
 
 def extend_scalar(
-    mesh: MeshLike | VectorHeat, sources: ArrayLike, values: ArrayLike
+    mesh: MeshLike | PointCloud | VectorHeat, sources: ArrayLike, values: ArrayLike
 ) -> Float[np.ndarray, " n"]:
     """Extend values at some vertices to all vertices, each taking that of the nearest source.
 
@@ -156,7 +168,7 @@ def extend_scalar(
 
     Parameters
     ----------
-    mesh : MeshLike or VectorHeat
+    mesh : MeshLike, PointCloud or VectorHeat
         `prepare_vector_heat(mesh)` keeps the factors for further calls.
     sources : (k,) int
         Vertices.
@@ -201,7 +213,7 @@ def extend_scalar(
 
 
 def transport_vectors(
-    mesh: MeshLike | VectorHeat, sources: ArrayLike, vectors: ArrayLike
+    mesh: MeshLike | PointCloud | VectorHeat, sources: ArrayLike, vectors: ArrayLike
 ) -> Float[np.ndarray, "n 2"]:
     """Transport tangent vectors from some vertices to all, along shortest paths.
 
@@ -216,7 +228,7 @@ def transport_vectors(
 
     Parameters
     ----------
-    mesh : MeshLike or VectorHeat
+    mesh : MeshLike, PointCloud or VectorHeat
         `prepare_vector_heat(mesh)` keeps the factors for further calls.
     sources : (k,) int
         Vertices.
@@ -272,9 +284,20 @@ def transport_vectors(
     return as_rows(found * lengths)
 
 
-def as_vector_heat(mesh: MeshLike | VectorHeat) -> VectorHeat:
-    """Prepare a mesh with the usual options, unless it is prepared."""
+def as_vector_heat(mesh: MeshLike | PointCloud | VectorHeat) -> VectorHeat:
+    """Prepare a surface with the usual options, unless it is prepared."""
     return mesh if isinstance(mesh, VectorHeat) else prepare_vector_heat(mesh)
+
+
+def as_mesh_heat(mesh: MeshLike | VectorHeat) -> MeshVectorHeat:
+    """Prepare a mesh, unless it is prepared; raise InvalidParameterError if it is a point cloud."""
+    solver = as_vector_heat(mesh if isinstance(mesh, VectorHeat) else as_mesh(mesh))
+    if not isinstance(solver, MeshVectorHeat):
+        raise InvalidParameterError(
+            "mesh must have faces; this VectorHeat is that of a point cloud. Use transport_vectors or "
+            "extend_scalar."
+        )
+    return solver
 
 
 def as_rows(field: Complex[np.ndarray, " n"]) -> Float[np.ndarray, "n 2"]:
@@ -311,7 +334,7 @@ def normalize(field: Complex[np.ndarray, " n"]) -> Complex[np.ndarray, " n"]:
     return field / np.where(lengths > 0, lengths, 1.0)
 
 
-def side_vectors(solver: VectorHeat) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def side_vectors(solver: MeshVectorHeat) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return of each side: itself as a vector at its tail and at its head; its turn; its weight.
 
     The turn takes a vector from the tail to the head. Weights are half of one cotangent.
@@ -334,7 +357,9 @@ def scalar_impulse(solver: VectorHeat, start: int) -> Float[np.ndarray, " n"]:
     return heat[:, 0]
 
 
-def edge_sums(solver: VectorHeat, field: Complex[np.ndarray, " n"]) -> Complex[np.ndarray, " h"]:
+def edge_sums(
+    solver: MeshVectorHeat, field: Complex[np.ndarray, " n"]
+) -> Complex[np.ndarray, " h"]:
     """Add the vectors at both ends of each side, in the frame of its tail."""
     tails, heads = side_ends(solver.mesh.faces)
     _, _, turns, _ = side_vectors(solver)
@@ -342,7 +367,7 @@ def edge_sums(solver: VectorHeat, field: Complex[np.ndarray, " n"]) -> Complex[n
 
 
 def integrate_along_edges(
-    solver: VectorHeat, vectors: Complex[np.ndarray, " h"]
+    solver: MeshVectorHeat, vectors: Complex[np.ndarray, " h"]
 ) -> Float[np.ndarray, " n"]:
     """Return the function whose gradient is nearest to a field, up to a constant per component.
 

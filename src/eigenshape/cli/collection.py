@@ -30,6 +30,7 @@ def collection(
     output: Path,
     landmarks: Path | None = None,
     unit: str = "mm",
+    curve_points: int | None = None,
     template: str | None = None,
     unmirrored: bool = False,
     workers: Workers = None,
@@ -42,7 +43,8 @@ def collection(
 
     The output has the mean shape (mean.ply), the landmarks of all specimens (landmarks.csv), their
     sizes, sides and what was noticed (specimens.csv) and a page that any browser opens
-    (report.html). A specimen that fails is named, and the others go on.
+    (report.html). If landmarks have curves, landmarks.sliders.csv has the rows of their points.
+    A specimen that fails is named, and the others go on.
     After Ctrl-C or a crash the same command continues where it stopped; until it has ended, the
     output keeps the last collection that was finished (collection.sqlite). Where standard error is
     a file, it gets a line for each step of a specimen. The exit code is 3 if some specimens failed.
@@ -62,6 +64,9 @@ def collection(
     unit
         Unit of the surfaces: m, cm, mm, um, nm or inch. Landmarks whose file names another one are
         converted to it.
+    curve_points
+        Space that many points evenly along each curve of the known landmarks, its ends included.
+        Without this the points of curves stay those that were drawn.
     template
         Name of the specimen that is fitted to all others first. By default that of the collection in
         the output folder, or of a new one the specimen with the median area.
@@ -80,7 +85,7 @@ def collection(
         pip install 'eigenshape[cluster]' on all machines, and files that all of them see.
     """
     # Files that cannot be read are found now, and not after hours.
-    labelled = steps.find_landmarks(folder, landmarks, output, unit)
+    labelled = steps.find_landmarks(folder, landmarks, output, unit, curve_points)
     with (
         steps.worker_processes(workers, timeout, memory, scheduler) as processes,
         progress_bar("collection") as progress,
@@ -107,6 +112,9 @@ def collection(
         warnings += [f"landmarks: {text}" for text in steps.mostly_doubtful(carried)]
         carried.save(output / "landmarks.csv")
         written.insert(2, "landmarks.csv")
+        if carried.curves:
+            written.insert(3, "landmarks.sliders.csv")
+            es.morphometrics.write_landmarks(carried.landmarks, output / written[3])
     with progress_bar("report") as progress:
         title = folder.absolute().name
         steps.write_collection_report(built, carried, output / "report.html", title, progress)

@@ -53,21 +53,24 @@ def demo(
         for name in CREATURES
         for pose in range(POSES)
     }
+    # Each step is printed before it begins: in a file there is no bar that moves.
+    out.print(
+        f"making {len(CREATURES)} kinds of creatures in {POSES} poses each: {escape_text(creatures)}"
+    )
     with progress_bar("creatures") as progress:
         for done, (path, (name, pose)) in enumerate(paths.items()):
             progress(done / len(paths), path.stem)
             if not path.exists():
                 path.parent.mkdir(parents=True, exist_ok=True)
                 es.write_mesh(es.make_creature(name, pose, n_vertices=N_VERTICES), path)
-    out.print(
-        f"made {len(CREATURES)} kinds of creatures in {POSES} poses each: {escape_text(creatures)}"
-    )
+    out.print(f"describing and indexing them, which takes most of a minute: {escape_text(index)}")
     add(index, [creatures], workers=workers)
 
+    out.print(
+        f"scanning a {kind} from one side, in a pose that the index has not seen: {escape_text(scan)}"
+    )
     whole = es.make_creature(kind, UNSEEN, n_vertices=N_VERTICES)
     es.write_mesh(es.partial_scan(whole, [0.9, 0.25, 0.45]).mesh, scan)
-    out.print(
-        f"scanned a {kind} from one side, in a pose that the index has not seen: {escape_text(scan)}"
-    )
+    out.print("searching for the shapes that are most like the scan, and drawing them")
     query(index, str(scan), n_matches=6, picture=output / "sheet.png")
     out.print(NEXT.format(scan=escape_text(scan), index=escape_text(index)))

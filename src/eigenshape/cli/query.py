@@ -275,7 +275,7 @@ def _draw(
     if picture:
         caption = (
             f"{literal(answer.title)} and the {len(answer.matches)} most similar shapes in "
-            f"{literal(index.name)} ({steps.CAPTION})"
+            f"{literal(index.name)}\n{steps.CAPTION}"
         )
         sheet = steps.contact_sheet(
             answer.colored, title, answer.matches, repairs=repairs, caption=caption, side=side

@@ -12,13 +12,13 @@ from certeig.kit.arrays import ReadOnly, record
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike
 from eigenshape._arrays import finite_rows
+from eigenshape._vectors import mean_radius, rotations_and_stretches
 from eigenshape.collections.spread_points import (
     join_normals,
     main_pieces,
     spread_points,
 )
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.measure import mean_radius, rotations_and_stretches
 from eigenshape.geometry.mesh import TriangleMesh
 
 # Lengths are in units of the root mean square distance of a surface from its middle. All numbers

@@ -11,13 +11,14 @@ from certeig.kit.arrays import ReadOnly, record
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.files import as_path, replace_file
 from certeig.kit.threads import one_blas_thread
+from eigenshape._vectors import mean_radius
 from eigenshape.collections.collection import Collection
 from eigenshape.geometry.distances.closest import closest_points
-from eigenshape.geometry.measure import mean_radius
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.samples.surface_points import SurfacePoints, place_points
+from eigenshape.morphometrics.curves import space_curves
 from eigenshape.morphometrics.landmark_files import csv_text
-from eigenshape.morphometrics.landmarks import Landmarks, require_same_names
+from eigenshape.morphometrics.landmarks import Landmarks, require_same_names, shared_curves
 from eigenshape.morphometrics.placement import require_on_surfaces
 
 # Expected error of a landmark from a single labelled specimen, where there is no second one to
@@ -63,6 +64,8 @@ class CarriedLandmarks(ReadOnly):
         put it. NaN where it is transferred, or no other specimen has it.
     confidence : (s, k) float
         That of the map at the landmark, 0 to 1, as of `Collection`.
+    curves : tuple of tuples of int
+        As `Landmarks.curves`, of all specimens.
 
     See Also
     --------
@@ -99,6 +102,15 @@ class CarriedLandmarks(ReadOnly):
     distance: Float[np.ndarray, "s k"]
     disagreement: Float[np.ndarray, "s k"]
     confidence: Float[np.ndarray, "s k"]
+    curves: tuple[tuple[int, ...], ...] = ()
+
+    @property
+    def landmarks(self) -> dict[str, Landmarks]:
+        """Landmarks of each specimen by name, which `write_landmarks` writes."""
+        return {
+            name: Landmarks(self.names, points, spread, self.curves)
+            for name, points, spread in zip(self.specimens, self.points, self.spread, strict=True)
+        }
 
     def save(self, path: str | Path) -> None:
         """Write a table of comma-separated values, a row for each landmark of each specimen.
@@ -132,14 +144,14 @@ def carry_landmarks(collection: Collection, labelled: Mapping[str, Landmarks]) -
 
     Each is taken to the mean shape, where those of all labelled specimens are averaged, and from
     there to the surface of each specimen. Doubtful ones are left out of the average where there are
-    others.
+    others. Points inside curves are then spaced evenly along the curve on each surface.
 
     Parameters
     ----------
     collection : Collection
     labelled : mapping of str to Landmarks
         By the name of the specimen, the same landmarks each, on its surface, in the frame and unit
-        of its file; NaN where one is missing.
+        of its file; NaN where one is missing. `resample_curves` spaces the points of their curves.
 
     Returns
     -------
@@ -149,12 +161,13 @@ def carry_landmarks(collection: Collection, labelled: Mapping[str, Landmarks]) -
     ------
     InvalidParameterError
         If no specimen is labelled, a labelled one is not in the collection, landmarks have other
-        names, one is missing on all specimens, or some do not lie on the surface of their specimen,
+        names or curves, one is missing on all specimens, or some do not lie on the surface of their specimen,
         as in another unit or frame: the error names each specimen.
 
     See Also
     --------
     build_collection
+    es.morphometrics.resample_curves : Space points of curves that were drawn on a template.
 
     Examples
     --------
@@ -173,7 +186,7 @@ def carry_landmarks(collection: Collection, labelled: Mapping[str, Landmarks]) -
     """
     require_type(collection, Collection, "collection")
     require_type(labelled, Mapping, "labelled")
-    names, given = _points_to_carry(collection, labelled)
+    names, curves, given = _points_to_carry(collection, labelled)
     mean, faces = collection.mean, collection.mean.faces
     rows = [collection.number(name) for name in labelled]
     placements = require_on_surfaces(
@@ -200,7 +213,8 @@ def carry_landmarks(collection: Collection, labelled: Mapping[str, Landmarks]) -
     carried = np.full_like(given, np.nan)  # to each labelled specimen, from all others
     for row, name in enumerate(collection.names):
         surface = collection.read_specimen(name)  # one at a time: together they may fill the memory
-        points[row] = _carry(collection, row, surface, places)
+        on_surface = _carry(collection, row, surface, places)
+        points[row] = space_curves(on_surface, curves, surface, name)
         if row in rows and len(rows) > 1:
             others = np.delete(on_mean, rows.index(row), axis=0)
             seen = np.isfinite(others).all(axis=2).any(axis=0)
@@ -232,7 +246,16 @@ def carry_landmarks(collection: Collection, labelled: Mapping[str, Landmarks]) -
     distance[at] = far[own]
     disagreement[at] = apart[own] * radii[at[0]]
     return CarriedLandmarks(
-        collection.names, names, points, spread, doubtful, is_given, distance, disagreement, sure
+        collection.names,
+        names,
+        points,
+        spread,
+        doubtful,
+        is_given,
+        distance,
+        disagreement,
+        sure,
+        curves,
     )
 
 
@@ -253,8 +276,8 @@ def _disagreements(on_mean: Float[np.ndarray, "m k 3"]) -> Float[np.ndarray, "m 
 
 def _points_to_carry(
     collection: Collection, labelled: Mapping[str, Landmarks]
-) -> tuple[tuple[str, ...], Float[np.ndarray, "m k 3"]]:
-    """Return the names of the landmarks, and the points of each labelled specimen."""
+) -> tuple[tuple[str, ...], tuple[tuple[int, ...], ...], Float[np.ndarray, "m k 3"]]:
+    """Return names and curves of the landmarks, and the points of each labelled specimen."""
     if not labelled:
         raise InvalidParameterError("At least one specimen must have landmarks; there are none.")
     require_same_names(labelled, "labelled")
@@ -268,7 +291,7 @@ def _points_to_carry(
             "Each landmark must be given on one specimen at least; "
             f"{names[np.argmax(missing)]!r} is missing on all."
         )
-    return names, given
+    return names, shared_curves(labelled, "labelled"), given
 
 
 def _carry(

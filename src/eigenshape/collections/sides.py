@@ -5,8 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 from jaxtyping import Float
 
+from eigenshape._vectors import rotations_and_stretches
 from eigenshape.collections.alignment import CLEAR_SIDE
-from eigenshape.geometry.measure import rotations_and_stretches
 from eigenshape.morphometrics.landmarks import Landmarks
 
 

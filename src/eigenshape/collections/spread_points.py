@@ -6,8 +6,9 @@ from scipy.spatial import cKDTree
 
 from certeig.kit.arrays import record
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import area_vectors
 from eigenshape.geometry.distances.crossing_loops import curve_places
-from eigenshape.geometry.measure import area_vectors, face_areas
+from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.samples.surface_points import SurfacePoints, place_points
 from eigenshape.geometry.topology import vertex_components

@@ -14,6 +14,7 @@ from certeig.kit.arrays import ReadOnly, record
 from certeig.kit.errors import CerteigError
 from certeig.kit.threads import one_blas_thread
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import area_vectors, mean_radius, unit_vectors
 from eigenshape.collections.alignment import (
     MIRROR,
     ON_SURFACE,
@@ -28,7 +29,7 @@ from eigenshape.collections.spread_points import (
 )
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.distances.closest import closest_points
-from eigenshape.geometry.measure import area_vectors, mean_normals, mean_radius, unit_vectors
+from eigenshape.geometry.measure import mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import dual_volumes
 from eigenshape.geometry.topology import boundary_vertices, edge_table

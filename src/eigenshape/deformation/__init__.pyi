@@ -7,6 +7,7 @@ from .distortion import measure_distortion as measure_distortion
 from .edits import Edit as Edit
 from .edits import Move as Move
 from .handles import Rotation as Rotation
+from .handles import Scaling as Scaling
 from .handles import Translation as Translation
 from .pose_transfer import transfer_deformation as transfer_deformation
 from .region import BoxRegion as BoxRegion

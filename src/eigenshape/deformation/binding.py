@@ -13,6 +13,7 @@ from certeig.kit.arrays import ReadOnly, record, whole_number
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import Integer
+from eigenshape._errors import count_nouns
 from eigenshape.deformation.region import Region, region_mask, require_boundary
 from eigenshape.deformation.region_patches import Patch, split_region
 from eigenshape.deformation.rig import EigenRig
@@ -23,7 +24,6 @@ from eigenshape.deformation.rigidity import (
     require_fixed_vertices,
 )
 from eigenshape.geometry.distances.geodesic import geodesic_distances
-from eigenshape.geometry.repairs.repair_report import count_nouns
 
 # (least extent of a region over that of the rest, number of modes): the rule of thesis 6.3.2.
 MODE_RULE = ((0.75, 8), (0.1, 50), (0.0, 300))

@@ -9,7 +9,7 @@ from jaxtyping import Float
 from certeig.kit.arguments import require_type
 from certeig.kit.typing import Integer
 from eigenshape.deformation.binding import Binding, bind, pull_binding
-from eigenshape.deformation.handles import Handle, require_handle, require_handles
+from eigenshape.deformation.handles import Handle, Scaling, require_handle, require_handles
 from eigenshape.deformation.modes import Mode, require_mode
 from eigenshape.deformation.region import Region
 from eigenshape.deformation.rig import EigenRig
@@ -48,7 +48,7 @@ def deform(
     rig : EigenRig
     region : (n,) bool, (k,) int, BoxRegion or BrushRegion
         The vertices that the handle moves.
-    handle : Rotation or Translation
+    handle : Rotation, Translation or Scaling
     fixed : region, optional
         The vertices that must stay; see `bind`.
     mode : "graded", "uncrossed" or "thesis"
@@ -95,7 +95,7 @@ def bend(binding: Binding, handles: Sequence[Handle], *, mode: Mode = "graded") 
     Parameters
     ----------
     binding : Binding
-    handles : sequence of r Rotation or Translation
+    handles : sequence of r Rotation, Translation or Scaling
         One for each region.
     mode : "graded", "uncrossed" or "thesis"
         "graded" rotates each vertex by its share of the motion and then makes edges as rigid as
@@ -152,10 +152,15 @@ def bend_graded(
     does not pinch (a linear fit of the rotated coordinates would pass through the axis). Vertices
     of share 0 or 1 stay there. The free vertices then move so that edges are as rigid as possible.
     """
-    pairs = zip(handles, binding.shares, strict=True)
+    pairs = list(zip(handles, binding.shares, strict=True))
     turns = quaternions(sum((np.outer(share, handle.turn) for handle, share in pairs), np.zeros(3)))
     start = move_by_shares(binding, handles)
-    return relax(binding.rig.edges, binding.part, binding.rig.mesh.vertices, start, turns, n_rounds)
+    # A scaling changes lengths. Edges then stay as rigid as they can beside those of the scaled shape.
+    rest = binding.rig.mesh.vertices
+    for handle, share in pairs:
+        if isinstance(handle, Scaling):
+            rest = rest + handle.carry(binding.rig.mesh.vertices, share)
+    return relax(binding.rig.edges, binding.part, rest, start, turns, n_rounds)
 
 
 def bend_uncrossed(binding: Binding, handles: Sequence[Handle]) -> Float[np.ndarray, "n 3"]:

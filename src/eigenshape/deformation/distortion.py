@@ -5,11 +5,11 @@ from jaxtyping import Float, Int
 
 from certeig.kit.arrays import ReadOnly, record
 from certeig.kit.errors import InvalidParameterError
+from eigenshape._vectors import area_vectors, size_one
 from eigenshape.deformation.rigidity import edge_weights, fit_turns
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.measure import area_vectors, bounding_box, edge_lengths
+from eigenshape.geometry.measure import edge_lengths
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.simplices import size_one
 from eigenshape.operators.cotangent import cotangent_laplacian
 
 
@@ -89,7 +89,6 @@ def measure_distortion(before: MeshLike, after: MeshLike) -> Distortion:
     old, new = (TriangleMesh(points, before.faces) for points in (rest, after.vertices / scale))
     lengths = edge_lengths(old)
     change = edge_lengths(new) - lengths
-    low, high = bounding_box(old)
     normals, turned = (area_vectors(mesh.vertices[mesh.faces]) for mesh in (old, new))
     edges = edge_weights(old, cotangent_laplacian(old).stiffness)
     turns = fit_turns(edges, old.vertices, new.vertices)[old.faces]
@@ -97,7 +96,7 @@ def measure_distortion(before: MeshLike, after: MeshLike) -> Distortion:
     away = np.einsum("fcij,fj,fi->f", turns, normals, turned) < 0
     return Distortion(
         float(np.sqrt(np.mean((change / lengths) ** 2))),
-        float(np.sqrt(np.mean(change**2)) / np.linalg.norm(high - low)),
+        float(np.sqrt(np.mean(change**2)) / np.linalg.norm(np.ptp(rest, axis=0))),
         np.linalg.norm(turned, axis=1) / np.linalg.norm(normals, axis=1),
         np.flatnonzero(away),
     )

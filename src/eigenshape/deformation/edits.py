@@ -13,7 +13,13 @@ from certeig.kit.arrays import ReadOnly, record, whole_number
 from certeig.kit.errors import FileFormatError, InvalidParameterError
 from eigenshape.deformation.binding import bind
 from eigenshape.deformation.deform import bend
-from eigenshape.deformation.handles import Handle, Rotation, Translation, require_handle
+from eigenshape.deformation.handles import (
+    Handle,
+    Rotation,
+    Scaling,
+    Translation,
+    require_handle,
+)
 from eigenshape.deformation.modes import Mode, require_mode
 from eigenshape.deformation.region import BoxRegion, BrushRegion, Region, copy_region, region_mask
 from eigenshape.deformation.rig import EigenRig, pose_rig
@@ -23,7 +29,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 # not read what is written.
 KIND, VERSION = "eigenshape edits", 2
 # Names of handles and regions in it; a mask is written as the list of its vertices.
-HANDLES = {"rotation": Rotation, "translation": Translation}
+HANDLES = {"rotation": Rotation, "translation": Translation, "scaling": Scaling}
 REGIONS = {"box": BoxRegion, "brush": BrushRegion}
 OPEN_SIDES = {"low": -np.inf, "high": np.inf}
 
@@ -62,7 +68,7 @@ class Move(ReadOnly):
     ----------
     region : (n,) bool, (k,) int, BoxRegion or BrushRegion
         See `region_mask`.
-    handle : Rotation or Translation
+    handle : Rotation, Translation or Scaling
 
     Raises
     ------

@@ -7,7 +7,7 @@ from jaxtyping import Float
 from typing_extensions import TypeAliasType
 
 from certeig.kit.arguments import require_each, require_type
-from certeig.kit.arrays import ReadOnly, finite_number, finite_values, freeze, record
+from certeig.kit.arrays import EPS, ReadOnly, finite_number, finite_values, freeze, record
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike
 
@@ -56,7 +56,7 @@ class Rotation(ReadOnly):
             raise InvalidParameterError("axis must have a direction; it is [0, 0, 0].")
         length = largest * np.linalg.norm(direction / largest)
         # An axis of length 1 keeps its last digits.
-        if abs(length - 1) > 4 * np.finfo(float).eps:
+        if abs(length - 1) > 4 * EPS:
             direction = direction / largest
             direction = direction / np.linalg.norm(direction)
         vars(self).update(
@@ -139,18 +139,82 @@ class Translation(ReadOnly):
         return share[:, None] * self.vector
 
 
+@record
+class Scaling(ReadOnly):
+    """A scaling about a pivot, by a factor along each axis of the coordinates.
+
+    Parameters
+    ----------
+    pivot : (3,) float
+        The point that stays, in length.
+    factors : (3,) float
+        Above 0; 1 keeps the size along that axis.
+
+    Raises
+    ------
+    InvalidParameterError
+        If a number is not finite, or a factor is not above 0.
+
+    See Also
+    --------
+    Rotation : A motion about an axis.
+    Translation : A motion along a vector.
+
+    Examples
+    --------
+    Make the upper part of a sphere twice as wide:
+
+    >>> import eigenshape as es
+    >>> mesh = es.icosphere(2)
+    >>> wider = es.deformation.Scaling(pivot=[0, 0, 1], factors=[2, 2, 1])
+    >>> bent = es.deform(es.rig_shape(mesh), mesh.vertices[:, 2] > 0.2, wider)
+    >>> float(bent.vertices[:, 0].max().round(1))
+    1.7
+    """
+
+    pivot: Float[np.ndarray, " 3"]
+    factors: Float[np.ndarray, " 3"]
+
+    def __init__(self, pivot: ArrayLike, factors: ArrayLike) -> None:
+        sizes = as_vector(factors, "factors")
+        if sizes.min() <= 0:
+            raise InvalidParameterError(
+                f"factors must be above 0; the factor along {'xyz'[sizes.argmin()]} is "
+                f"{sizes.min()}. A factor of 0.5 halves a length."
+            )
+        vars(self).update(pivot=freeze(as_vector(pivot, "pivot")), factors=freeze(sizes))
+
+    @property
+    def turn(self) -> Float[np.ndarray, " 3"]:
+        """Rotation vector: zero."""
+        return np.zeros(3)
+
+    def carry(
+        self, points: Float[np.ndarray, "n 3"], share: Float[np.ndarray, " n"]
+    ) -> Float[np.ndarray, "n 3"]:
+        """Return the displacement of each point: its share of the whole displacement.
+
+        Parameters
+        ----------
+        points : (n, 3) float
+        share : (n,) float
+            Share of the motion that each point follows, usually 0 to 1.
+        """
+        return share[:, None] * (self.factors - 1) * (points - self.pivot)
+
+
 # `help` shows the name.
-Handle = TypeAliasType("Handle", Rotation | Translation)
+Handle = TypeAliasType("Handle", Rotation | Translation | Scaling)
 
 
 def require_handle(value: object) -> None:
-    """Raise an error if a value is neither a rotation nor a translation."""
-    require_type(value, Rotation | Translation, "handle")
+    """Raise an error if a value is no handle."""
+    require_type(value, Handle.__value__, "handle")
 
 
 def require_handles(handles: Sequence[Handle], n_regions: int) -> None:
     """Raise an error if there is not one handle for each region."""
-    require_each(handles, Rotation | Translation, "handles")
+    require_each(handles, Handle.__value__, "handles")
     if len(handles) != n_regions:
         raise InvalidParameterError(
             "Each region must have one handle; "
@@ -163,6 +227,8 @@ def affine_offset(handle: Handle) -> Float[np.ndarray, "3 4"]:
     shift = handle.carry(np.zeros((1, 3)), np.ones(1))[0]
     if isinstance(handle, Translation):
         return np.column_stack([np.zeros((3, 3)), shift])
+    if isinstance(handle, Scaling):
+        return np.column_stack([np.diag(handle.factors - 1), shift])
     # The linear part, from a rotation about the origin: a distant pivot would cost digits.
     about_origin = Rotation(np.zeros(3), handle.axis, handle.angle)
     return np.column_stack([about_origin.carry(np.eye(3), np.ones(3)).T, shift])

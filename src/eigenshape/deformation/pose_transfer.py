@@ -8,14 +8,14 @@ from certeig.kit.arrays import real_numbers, whole_number, whole_numbers
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike, Integer
+from eigenshape._vectors import nearest_rotations, size_one
 from eigenshape.deformation.distortion import require_poses
 from eigenshape.deformation.rigidity import edge_weights, fit_turns, free_part
 from eigenshape.deformation.rigidity_loops import turn_edges
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.measure import nearest_rotations
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import warn_of_seams
-from eigenshape.geometry.simplices import dual_volumes, size_one
+from eigenshape.geometry.simplices import dual_volumes
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.spectral.maps.functional_map import FunctionalMap, point_areas, transfer_function
 from eigenshape.spectral.maps.point_maps import map_from_points

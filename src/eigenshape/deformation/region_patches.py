@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from eigenshape._arrays import label_components
 from eigenshape.deformation.region import Region, region_boundary, region_mask, require_boundary
 from eigenshape.geometry.distances.geodesic import geodesic_distances, unchecked_waves
-from eigenshape.geometry.facet_lists import label_components
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import half_edges, vertex_components
 

@@ -13,8 +13,8 @@ from certeig.kit.errors import InvalidParameterError
 from certeig.kit.threads import one_blas_thread
 from certeig.sparse.symmetric_factor import SymmetricFactor, factor_matrix
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import nearest_rotations
 from eigenshape.deformation.rigidity_loops import fit_rotations, turn_edges
-from eigenshape.geometry.measure import nearest_rotations
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table
 

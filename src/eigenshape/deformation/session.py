@@ -147,7 +147,7 @@ class DeformationSession:
         ----------
         region : (n,) bool, (k,) int, BoxRegion or BrushRegion
             The vertices that the handle moves.
-        handle : Rotation or Translation
+        handle : Rotation, Translation or Scaling
         fixed : region, optional
             The vertices that must stay; see `bind`.
         n_modes : int, optional

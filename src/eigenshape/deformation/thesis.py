@@ -112,7 +112,7 @@ def move_skeleton(
     Parameters
     ----------
     response : SkeletonResponse
-    handles : sequence of r Rotation or Translation
+    handles : sequence of r Rotation, Translation or Scaling
         One for each region.
 
     Returns
@@ -330,7 +330,7 @@ def eigen_deformation(
     Parameters
     ----------
     skeleton : DetailedSkeleton
-    handles : sequence of r Rotation or Translation
+    handles : sequence of r Rotation, Translation or Scaling
         One for each region.
     details : "blended", "frames" or "handle"
         How the first pass turns details: blended as in 6.3.1, by local frames alone, or by handles

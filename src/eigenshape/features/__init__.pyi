@@ -8,7 +8,6 @@ from .diagram import persistence_diagram as persistence_diagram
 from .merge_tree import merge_tree as merge_tree
 from .parcellation import Parcellation as Parcellation
 from .parcellation import parcellate as parcellate
-from .parcellation import unparcellate as unparcellate
 from .part_merging import part_tree as part_tree
 from .parts import PartDecomposition as PartDecomposition
 from .parts import find_parts as find_parts

@@ -7,12 +7,12 @@ from scipy.sparse.csgraph import breadth_first_order, dijkstra, maximum_flow
 
 from certeig.kit.arguments import require_type
 from certeig.kit.arrays import positive_values, record
+from eigenshape._arrays import adjacency_matrix, label_components
 from eigenshape.features.segmentation import Segmentation, adjacent_parts
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.facet_lists import label_components
 from eigenshape.geometry.measure import face_areas, scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.topology import adjacency_matrix, edge_table, face_pairs
+from eigenshape.geometry.topology import edge_table, face_pairs
 from eigenshape.operators.anisotropic import curvature_tensors
 
 # α of `curvature_tensors`, without unit: the strength of creases. The best of 1, 5, 10, 20, 40 and

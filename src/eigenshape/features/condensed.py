@@ -7,11 +7,11 @@ from certeig.kit.arrays import ReadOnly, real_numbers, record
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike
-from eigenshape._arrays import require_finite_rows
+from eigenshape._arrays import label_components, require_finite_rows
+from eigenshape._vectors import size_one
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.facet_lists import label_components
 from eigenshape.geometry.requirements import require_sound
-from eigenshape.geometry.simplices import dual_volumes, size_one
+from eigenshape.geometry.simplices import dual_volumes
 from eigenshape.geometry.topology import edge_table
 
 LOST = 0.05  # share of the variance that regions lose by default

@@ -6,13 +6,14 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from certeig.kit.arrays import record
+from eigenshape._arrays import label_components
+from eigenshape._vectors import area_vectors, unit_vectors
 from eigenshape.features.contrast import FINE_CONTRAST
 from eigenshape.features.part_merging import tree_of_merges
 from eigenshape.features.region_tree import PartTree
 from eigenshape.features.segmentation import FeaturePoints, Segmentation
 from eigenshape.geometry.creases import smooth_pairs
-from eigenshape.geometry.facet_lists import label_components
-from eigenshape.geometry.measure import area_vectors, scale_to_unit, unit_vectors
+from eigenshape.geometry.measure import scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table, face_pairs
 

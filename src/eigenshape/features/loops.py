@@ -8,8 +8,8 @@ from jaxtyping import Bool, Int
 from scipy.sparse.csgraph import breadth_first_order
 
 from certeig.kit.arrays import record
+from eigenshape._arrays import label_components
 from eigenshape.features.merge_loops import spanning_forest
-from eigenshape.geometry.facet_lists import label_components
 from eigenshape.geometry.facets import facet_table
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import Mesh

@@ -110,10 +110,6 @@ def parcellate(
         If `values` or the parcellation is of another number of vertices, or a value in a parcel is
         not finite.
 
-    See Also
-    --------
-    unparcellate : The other way.
-
     Examples
     --------
     >>> import eigenshape as es
@@ -147,47 +143,6 @@ def parcellate(
     areas = sums.sum(axis=1)
     with np.errstate(invalid="ignore"):  # a parcel without vertices has the mean 0 / 0
         return (sums @ rows[inside]) / areas.reshape(-1, *[1] * (rows.ndim - 1))
-
-
-def unparcellate(values: ArrayLike, parcellation: Parcellation) -> Float[np.ndarray, "n ..."]:
-    """Give each vertex the value of its parcel, and NaN where there is none.
-
-    Parameters
-    ----------
-    values : (p,) or (p, k) float
-        Values of the parcels.
-    parcellation : Parcellation
-        With p parcels on n vertices.
-
-    Returns
-    -------
-    (n,) or (n, k) float
-
-    Raises
-    ------
-    InvalidParameterError
-        If `values` does not hold one row per parcel.
-
-    See Also
-    --------
-    parcellate : Average over parcels.
-
-    Examples
-    --------
-    >>> import eigenshape as es
-    >>> parcels = es.features.Parcellation([0, 1, 1, -1])
-    >>> es.features.unparcellate([5.0, 7.0], parcels).tolist()
-    [5.0, 7.0, 7.0, nan]
-    """
-    require_type(parcellation, Parcellation, "parcellation")
-    rows = real_numbers(values, "values")
-    if rows.ndim not in (1, 2) or len(rows) != len(parcellation.names):
-        raise InvalidParameterError(
-            f"values must hold one row for each of {len(parcellation.names)} parcels; the shape is "
-            f"{rows.shape}."
-        )
-    beyond = np.full((1, *rows.shape[1:]), np.nan)  # which the label -1 finds
-    return np.concatenate([rows.astype(np.float64), beyond])[parcellation.labels]
 
 
 def require_parcels(parcellation: Parcellation, n_vertices: int) -> None:

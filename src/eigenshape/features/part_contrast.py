@@ -7,6 +7,7 @@ from scipy.spatial import KDTree
 from scipy.spatial.distance import cdist
 
 from certeig.kit.arrays import record
+from eigenshape._vectors import unit_vectors
 from eigenshape.features.contrast import FINE_CONTRAST, PART_CONTRAST
 from eigenshape.features.part_merging import (
     PART_TIME,
@@ -19,7 +20,7 @@ from eigenshape.features.part_merging import (
 )
 from eigenshape.features.region_tree import PartTree
 from eigenshape.features.segmentation import FeaturePoints, Segmentation, adjacent_parts
-from eigenshape.geometry.measure import face_areas, face_normals, scale_to_unit, unit_vectors
+from eigenshape.geometry.measure import face_areas, face_normals, scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table, face_pairs
 from eigenshape.spectral.spectrum import Spectrum

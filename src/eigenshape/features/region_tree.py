@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from certeig.kit.arrays import ReadOnly, record
-from eigenshape.geometry.facet_lists import label_components
+from eigenshape._arrays import label_components
 
 
 @record

@@ -3,8 +3,9 @@
 import numpy as np
 from jaxtyping import Bool, Float
 
+from eigenshape._vectors import area_vectors, unit_vectors
 from eigenshape.geometry.facets import corner_fans
-from eigenshape.geometry.measure import area_vectors, unit_vectors
+from eigenshape.geometry.measure import face_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import scaled_corners
 from eigenshape.geometry.topology import edge_table, face_pairs
@@ -26,7 +27,7 @@ def smooth_pairs(mesh: TriangleMesh) -> Bool[np.ndarray, " p"]:
 
     The faces must be turned alike. A face without area has no creases.
     """
-    normals = unit_vectors(area_vectors(scaled_corners(mesh)[0]))
+    normals = face_normals(mesh)
     pairs, _ = face_pairs(edge_table(mesh))
     one, two = normals[pairs].transpose(1, 0, 2)
     cosines = np.einsum("pi,pi->p", one, two)

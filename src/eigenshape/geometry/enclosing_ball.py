@@ -9,7 +9,7 @@ from certeig.kit.arrays import ReadOnly, record
 from certeig.kit.typing import ArrayLike
 from eigenshape._arrays import finite_rows
 from eigenshape._errors import InvalidShapeError
-from eigenshape.geometry.simplices import size_one
+from eigenshape._vectors import size_one
 
 Points = Float[np.ndarray, "n d"]
 Support = list[int]

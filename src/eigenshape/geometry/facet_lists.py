@@ -3,9 +3,7 @@
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 from jaxtyping import Int
-from scipy.sparse.csgraph import connected_components
 
 from certeig.kit.arrays import ReadOnly, record
 
@@ -89,12 +87,3 @@ def shared_facets(
     order = np.argsort(facets, kind="stable")
     same = facets[order][1:] == facets[order][:-1]
     return order[:-1][same], order[1:][same]
-
-
-def label_components(
-    n: int, one: Int[np.ndarray, " k"], two: Int[np.ndarray, " k"]
-) -> tuple[int, Int[np.ndarray, " n"]]:
-    """Count the groups of n things of which k pairs are linked, and return the group of each."""
-    graph = sp.coo_array((np.ones(len(one), dtype=np.int8), (one, two)), shape=(n, n))
-    count, labels = connected_components(graph, directed=False)
-    return int(count), labels.astype(np.int64)

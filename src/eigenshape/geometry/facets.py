@@ -3,11 +3,12 @@
 import numpy as np
 from jaxtyping import Bool, Int
 
+from eigenshape._arrays import label_components
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import size_one
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
-from eigenshape.geometry.facet_lists import FacetTable, label_components, shared_facets
+from eigenshape.geometry.facet_lists import FacetTable, shared_facets
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.simplices import size_one
 from eigenshape.geometry.simplicial import Mesh, SimplicialMesh
 
 

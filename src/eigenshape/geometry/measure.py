@@ -1,22 +1,15 @@
-"""Lengths, areas, volumes, normals and turns, accurate at any scale of the coordinates."""
-
-from collections.abc import Callable
-from typing import NamedTuple
+"""Lengths, areas, volumes and normals, accurate at any scale of the coordinates."""
 
 import numpy as np
 from jaxtyping import Float
 
+from eigenshape._vectors import area_vectors, size_one, triangle_areas, unit_vectors
 from eigenshape.geometry.cloud import Shape
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_oriented
-from eigenshape.geometry.simplices import at_points, in_length, scaled_corners, size_one
+from eigenshape.geometry.simplices import at_points, in_length, scaled_corners
 from eigenshape.geometry.topology import edge_table
-
-# How much the rotation of points follows a given one, as a share of their moments: a rotation about
-# the own axis of a limb as round as a finger, or of an eye, is hardly shown by its points.
-FOLLOW = 0.02
-ONE_PLACE = 1e-14  # mean square distance, in sizes², that is lost in rounding
 
 
 def scale_to_unit(mesh: TriangleMesh) -> tuple[Float[np.ndarray, "n 3"], float]:
@@ -28,17 +21,6 @@ def scale_to_unit(mesh: TriangleMesh) -> tuple[Float[np.ndarray, "n 3"], float]:
     points, scale = size_one(mesh.vertices)
     points, inner_scale = size_one(points - points.mean(axis=0))
     return points, scale * inner_scale
-
-
-def area_vectors(corners: Float[np.ndarray, "f 3 3"]) -> Float[np.ndarray, "f 3"]:
-    """Return the unit normal of each triangle times its area."""
-    a, b, c = corners.transpose(1, 0, 2)
-    return 0.5 * np.cross(b - a, c - a)
-
-
-def triangle_areas(corners: Float[np.ndarray, "f 3 3"]) -> Float[np.ndarray, " f"]:
-    """Return the area of each triangle, in the unit of its corners."""
-    return np.linalg.norm(area_vectors(corners), axis=1)
 
 
 def face_areas(mesh: MeshLike) -> Float[np.ndarray, " f"]:
@@ -202,12 +184,6 @@ def mean_normals(mesh: TriangleMesh) -> Float[np.ndarray, "n 3"]:
     return unit_vectors(np.column_stack(sums))
 
 
-def unit_vectors(vectors: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "k 3"]:
-    """Give vectors the length 1, and make zeros of those without one."""
-    norms = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return np.divide(vectors, norms, out=np.zeros_like(vectors), where=norms > 0)
-
-
 def edge_lengths(mesh: MeshLike) -> Float[np.ndarray, " e"]:
     """Compute the length of each edge.
 
@@ -240,75 +216,3 @@ def edge_lengths(mesh: MeshLike) -> Float[np.ndarray, " e"]:
 def bounding_box(shape: Shape) -> tuple[Float[np.ndarray, " d"], Float[np.ndarray, " d"]]:
     """Return the lowest and the highest corner of the box around all points."""
     return shape.points.min(axis=0), shape.points.max(axis=0)
-
-
-def mean_radius(points: Float[np.ndarray, "n 3"]) -> float:
-    """Return the root mean square distance of points from their middle."""
-    return float(np.sqrt(np.mean(np.sum((points - points.mean(axis=0)) ** 2, axis=1))))
-
-
-def nearest_rotations(matrices: Float[np.ndarray, "k 3 3"]) -> Float[np.ndarray, "k 3 3"]:
-    """Return the rotation nearest to each matrix in the Frobenius norm (Kabsch 1976)."""
-    return rotations_and_stretches(matrices)[0]
-
-
-def rotations_and_stretches(
-    matrices: Float[np.ndarray, "*k 3 3"],
-) -> tuple[Float[np.ndarray, "*k 3 3"], Float[np.ndarray, "*k 3"]]:
-    """Return the rotation R nearest to each matrix M, and signed stretches, whose sum is trace(RᵀM).
-
-    They are the singular values; the smallest is negative if M reflects.
-    """
-    left, stretches, right = np.linalg.svd(matrices)
-    # A reflection becomes a rotation by a change of sign along the smallest singular value.
-    signs = np.sign(np.linalg.det(left @ right))
-    left[..., 2] *= signs[..., None]
-    stretches[..., 2] *= signs
-    return left @ right, stretches
-
-
-class Similarities(NamedTuple):
-    """Rotation, factor of size, and center before and after, of k similarity transformations."""
-
-    rotations: Float[np.ndarray, "k 3 3"]
-    factors: Float[np.ndarray, " k"]
-    before: Float[np.ndarray, "k 3"]
-    after: Float[np.ndarray, "k 3"]
-
-    def move(self, points: Float[np.ndarray, "p 3"]) -> Float[np.ndarray, "p 3"]:
-        """Move a point by each, or all points by one."""
-        turned = np.einsum("...ij,...j->...i", self.rotations, points - self.before)
-        return self.after + self.factors[:, None] * turned
-
-
-def fit_similarities(
-    average: Callable[[Float[np.ndarray, "n c"]], Float[np.ndarray, "k c"]],
-    before: Float[np.ndarray, "n 3"],
-    after: Float[np.ndarray, "n 3"],
-    follow: Float[np.ndarray, "3 3"] | None = None,
-) -> Similarities:
-    """Fit similarities to n pairs of points by least squares, one for each of k weighted means (Umeyama 1991).
-
-    `average` returns the k means of each column of a table; it defines the weights. Rotations follow
-    a given one where points hardly show how they are turned.
-    """
-    # About the middle and in unit size, so that moments keep their digits
-    middles = before.mean(axis=0), after.mean(axis=0)
-    (one, size), (two, size_after) = size_one(before - middles[0]), size_one(after - middles[1])
-    products = np.einsum("ni,nj->nij", two, one).reshape(-1, 9)
-    means = average(np.column_stack([one, two, products, np.sum(one**2, axis=1)]))
-    center, there = means[:, :3], means[:, 3:6]
-    moments = means[:, 6:15].reshape(-1, 3, 3) - there[:, :, None] * center[:, None, :]
-    spreads = means[:, 15] - np.sum(center**2, axis=1)
-    if follow is not None:
-        moments += FOLLOW * np.linalg.norm(moments, axis=(1, 2), keepdims=True) * follow
-    rotations, stretches = rotations_and_stretches(moments)
-    # Points in one place have no size: they keep theirs.
-    has_size = spreads > ONE_PLACE
-    factors = np.divide(stretches.sum(axis=1), spreads, out=np.ones_like(spreads), where=has_size)
-    return Similarities(
-        rotations,
-        factors * (size_after / size),
-        middles[0] + size * center,
-        middles[1] + size_after * there,
-    )

@@ -8,8 +8,9 @@ from scipy.spatial.distance import cdist
 
 from certeig.kit.arguments import require_choice
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import triangle_areas
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.measure import scale_to_unit, triangle_areas
+from eigenshape.geometry.measure import scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import degenerate_simplices
 

@@ -4,9 +4,10 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from certeig.kit.threads import one_blas_thread
+from eigenshape._vectors import triangle_areas
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.face_turns import turn_faces
-from eigenshape.geometry.measure import enclosed_volume, mean_normals, scale_to_unit, triangle_areas
+from eigenshape.geometry.measure import enclosed_volume, mean_normals, scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_oriented
 from eigenshape.geometry.topology import is_closed

@@ -11,7 +11,7 @@ from eigenshape._errors import InvalidShapeError, try_auto
 from eigenshape.geometry.face_turns import face_turns, inconsistent_edges
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.seams import seams
-from eigenshape.geometry.simplices import require_volumes
+from eigenshape.geometry.simplices import MEASURES, degenerate_simplices, require_span
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.geometry.topology import (
     repeated_simplices,
@@ -29,6 +29,30 @@ def require_sound(mesh: Mesh) -> None:
     require_volumes(mesh)
     require_simplices_everywhere(mesh)
     require_different_simplices(mesh)
+
+
+def require_volumes(mesh: Mesh) -> None:
+    """Raise an error if a simplex has no volume.
+
+    If the points of the mesh lie in a flat, simplices have volume by rounding only, and are
+    refused, too.
+    """
+    flat = degenerate_simplices(mesh)
+    plural, singular, measure = MEASURES.get(mesh.dim, ("Simplices", "simplex", "volume"))
+    if flat.size == len(mesh.simplices):
+        raise InvalidShapeError(
+            f"{plural} must have {measure}; all {flat.size} have none: their points are equal or "
+            f"{'on a line' if mesh.dim == 2 else 'in a flat of lower dimension'}."
+        )
+    if flat.size:
+        corners = mesh.simplices[flat[0]]
+        raise InvalidShapeError(
+            f"{plural} must have {measure}; {singular} {flat[0]} is {corners.tolist()} "
+            f"with corners {mesh.points[corners].tolist()} ({flat.size} such). {try_auto()}"
+        )
+    used = np.zeros(mesh.n_points, dtype=bool)
+    used[mesh.simplices] = True
+    require_span(mesh.points[used], mesh.dim, "The points of a mesh")
 
 
 def require_different_simplices(mesh: Mesh) -> None:

@@ -6,11 +6,11 @@ import numpy as np
 import scipy  # which loads scipy.spatial where it is used: it takes 0.1 s
 from jaxtyping import Float, Int
 
-from eigenshape.geometry.facet_lists import label_components
+from eigenshape._arrays import label_components, number_places, sorted_rows
+from eigenshape._vectors import size_one
 from eigenshape.geometry.facets import boundary_facets
-from eigenshape.geometry.simplices import side_lengths, size_one
+from eigenshape.geometry.simplices import side_lengths
 from eigenshape.geometry.simplicial import Mesh
-from eigenshape.geometry.topology import number_places, sorted_rows
 
 # How far both sides of a seam are apart when each was computed for itself, in roundings of the size
 # of the mesh: the cosine and sine of 0 and 2π differ by 3.

@@ -6,7 +6,9 @@ from math import factorial
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from eigenshape._errors import InvalidShapeError, try_auto
+from certeig.kit.arrays import EPS
+from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import size_of, size_one
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.simplicial import Mesh
 
@@ -15,7 +17,7 @@ from eigenshape.geometry.simplicial import Mesh
 THINNEST = 1e-14
 # Points of size 1 nearer than this to a line or plane lie in it, up to rounding: some tens of
 # roundings of one coordinate.
-SPAN_ROUNDING = 64 * float(np.finfo(np.float64).eps)
+SPAN_ROUNDING = 64 * EPS
 # Names of flats by dimension, for messages.
 FLATS = {1: "on a line", 2: "in a plane"}
 # Areas and volumes are returned if their scale is within 2^-1000..2^1000. Beyond, sums would
@@ -36,21 +38,9 @@ def scaled_corners(mesh: Mesh) -> tuple[Float[np.ndarray, "s corners d"], float]
     the last digit, and not on the order of the vertices or on unreferenced ones.
     """
     corners = np.take(mesh.points, mesh.simplices, axis=0)
-    scale = _size(corners)
+    scale = size_of(corners)
     corners /= scale
     return corners, scale
-
-
-def size_one(coordinates: Float[np.ndarray, "..."]) -> tuple[Float[np.ndarray, "..."], float]:
-    """Return coordinates divided by a power of two that brings the largest to size 1, and it."""
-    scale = _size(coordinates)
-    return coordinates / scale, scale
-
-
-def _size(coordinates: Float[np.ndarray, "..."]) -> float:
-    largest = max(coordinates.max(initial=0.0), -coordinates.min(initial=0.0))
-    # One less than the exponent of frexp, so that the power exists for the largest float too.
-    return float(2.0 ** (np.frexp(largest)[1] - 1)) if largest > 0 else 1.0
 
 
 def in_length(
@@ -288,27 +278,3 @@ def cut_tetrahedra(
         (2, [(0, 2), (1, 3), (1, 2)]),
     ]
     return np.concatenate([ordered[n_inside == count][:, cut] for count, cut in cuts])
-
-
-def require_volumes(mesh: Mesh) -> None:
-    """Raise an error if a simplex has no volume.
-
-    If the points of the mesh lie in a flat, simplices have volume by rounding only, and are
-    refused, too.
-    """
-    flat = degenerate_simplices(mesh)
-    plural, singular, measure = MEASURES.get(mesh.dim, ("Simplices", "simplex", "volume"))
-    if flat.size == len(mesh.simplices):
-        raise InvalidShapeError(
-            f"{plural} must have {measure}; all {flat.size} have none: their points are equal or "
-            f"{'on a line' if mesh.dim == 2 else 'in a flat of lower dimension'}."
-        )
-    if flat.size:
-        corners = mesh.simplices[flat[0]]
-        raise InvalidShapeError(
-            f"{plural} must have {measure}; {singular} {flat[0]} is {corners.tolist()} "
-            f"with corners {mesh.points[corners].tolist()} ({flat.size} such). {try_auto()}"
-        )
-    used = np.zeros(mesh.n_points, dtype=bool)
-    used[mesh.simplices] = True
-    require_span(mesh.points[used], mesh.dim, "The points of a mesh")

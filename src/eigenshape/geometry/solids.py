@@ -5,7 +5,7 @@ import numpy as np
 from certeig.kit.typing import ArrayLike
 from eigenshape._arrays import finite_rows
 from eigenshape._errors import InvalidShapeError
-from eigenshape.geometry.simplices import size_one
+from eigenshape._vectors import size_one
 from eigenshape.geometry.simplicial import SimplicialMesh
 
 # The faces of a solid by its number of corners, each seen from outside in one sense of rotation.

@@ -2,13 +2,14 @@
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Int
 
 from certeig.kit.arrays import ReadOnly, record
 from certeig.kit.errors import InvalidParameterError
+from eigenshape._arrays import adjacency_matrix, label_components, number_places, sorted_rows
 from eigenshape._errors import InvalidShapeError, try_auto
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
-from eigenshape.geometry.facet_lists import label_components, shared_facets
+from eigenshape.geometry.facet_lists import shared_facets
 from eigenshape.geometry.facets import boundary_facets, corner_fans, facet_table
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import Mesh
@@ -92,12 +93,6 @@ def neighbor_links(mesh: TriangleMesh) -> sp.csr_array:
     return adjacency_matrix(edges, np.ones(len(edges)), mesh.n_vertices)
 
 
-def adjacency_matrix(edges: Int[np.ndarray, "e 2"], values: np.ndarray, n: int) -> sp.csr_array:
-    """Return the symmetric matrix of weighted edges, each given once."""
-    both = np.concatenate([edges, edges[:, ::-1]]).T
-    return sp.coo_array((np.tile(values, 2), both), shape=(n, n)).tocsr()
-
-
 def unique_edges(
     one: Int[np.ndarray, "..."], two: Int[np.ndarray, "..."], n: int
 ) -> Int[np.ndarray, "e 2"]:
@@ -164,17 +159,6 @@ def require_simplices_everywhere(mesh: Mesh) -> None:
         )
 
 
-def sorted_rows(
-    rows: Int[np.ndarray, "r c"],
-) -> tuple[Int[np.ndarray, " r"], Int[np.ndarray, "r c"], Bool[np.ndarray, " r"]]:
-    """Sort rows: return the stable order, the sorted rows, and which repeat the row before."""
-    order = np.lexsort(rows.T[::-1])
-    ordered = rows[order]
-    repeats = np.zeros(len(rows), dtype=bool)
-    repeats[1:] = (ordered[1:] == ordered[:-1]).all(axis=1)
-    return order, ordered, repeats
-
-
 def repeated_simplices(mesh: Mesh) -> Int[np.ndarray, "k 2"]:
     """Return pairs of simplices with the same corners in any order: the first one, and a later one.
 
@@ -193,13 +177,6 @@ def repeated_simplices(mesh: Mesh) -> Int[np.ndarray, "k 2"]:
     firsts = order[starts][np.cumsum(~repeats) - 1]
     pairs = np.column_stack([firsts, order])[repeats]
     return pairs[np.argsort(pairs[:, 1])]
-
-
-def number_places(points: Float[np.ndarray, "n d"]) -> Int[np.ndarray, " n"]:
-    """Return for each point the number of its place; equal points have the same place."""
-    # np.unique compares bytes; adding 0.0 turns -0.0 into 0.0.
-    _, place = np.unique(points + 0.0, axis=0, return_inverse=True)
-    return place.ravel().astype(np.int64)
 
 
 def join_places(mesh: TriangleMesh) -> tuple[TriangleMesh, Int[np.ndarray, " n"]]:

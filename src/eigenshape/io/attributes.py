@@ -10,9 +10,9 @@ from scipy.sparse import csr_array, eye_array
 
 from certeig.kit.arrays import ReadOnly, record
 from certeig.kit.text import html_repr
-from eigenshape.geometry.measure import area_vectors, unit_vectors
+from eigenshape._arrays import number_places
+from eigenshape._vectors import area_vectors, unit_vectors
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.topology import number_places
 from eigenshape.io.opening import SourceFile
 
 SAME_NORMAL = 1000  # steps from 0 to 1; normals that agree to a step are one

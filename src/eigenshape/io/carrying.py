@@ -7,13 +7,14 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.sparse import csr_array
 
+from eigenshape._arrays import number_places, sorted_rows
+from eigenshape._vectors import area_vectors, size_one, unit_vectors
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.distances.closest import closest_points
 from eigenshape.geometry.distances.closest_loops import nearest_around
-from eigenshape.geometry.measure import area_vectors, mean_normals, unit_vectors
+from eigenshape.geometry.measure import mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.simplices import size_one
-from eigenshape.geometry.topology import disjoint_union, join_places, number_places, sorted_rows
+from eigenshape.geometry.topology import disjoint_union, join_places
 from eigenshape.io.attributes import MeshAttributes, plain_attributes
 
 # Faces are searched this many times as far from the middle of a new face as its corners are.

@@ -11,11 +11,10 @@ from jaxtyping import Float, Int, UInt8
 from certeig.kit.arguments import require_type
 from certeig.kit.errors import FileFormatError, InvalidParameterError
 from certeig.kit.files import as_path, replace_file
-from eigenshape._errors import InvalidShapeError
+from eigenshape._errors import PLURALS, InvalidShapeError, count_nouns
 from eigenshape._typing import FileLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.repairs.repair_report import PLURALS, count_nouns
 from eigenshape.io.attributes import (
     MeshAttributes,
     WriteJob,

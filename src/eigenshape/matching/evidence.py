@@ -9,7 +9,8 @@ from jaxtyping import Float, Int
 from scipy.special import expit
 
 from certeig.kit.arrays import record
-from eigenshape.geometry.measure import area_vectors, face_areas, triangle_areas
+from eigenshape._vectors import area_vectors, triangle_areas
+from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.simplices import at_points
 from eigenshape.geometry.topology import edge_table, neighbor_links
 from eigenshape.matching.fitting import Fit

@@ -16,8 +16,13 @@ from scipy.linalg.lapack import dpotrs
 from scipy.spatial import cKDTree
 
 from certeig.kit.arrays import record
-from eigenshape.geometry.measure import nearest_rotations
-from eigenshape.matching.fitting_loops import add_pulls, add_tensions, turn_frames
+from eigenshape._vectors import nearest_rotations
+from eigenshape.matching.fitting_loops import (
+    add_forces,
+    carry_vertices,
+    fill_stiffness,
+    turn_frames,
+)
 from eigenshape.matching.match_loops import nearest_rows
 from eigenshape.matching.surface import Surface
 
@@ -125,7 +130,7 @@ def _plan(
     lengths = np.take_along_axis(part.distances[:m].T, nearest, axis=1).astype(np.float64)
     portions = np.maximum(1 - lengths[:, :-1] / np.maximum(lengths[:, -1:], TINY), 1e-4) ** 2
     portions /= portions.sum(axis=1, keepdims=True)
-    carriers = nearest[:, :-1]
+    carriers = np.ascontiguousarray(nearest[:, :-1])
     near = np.argsort(part.between[:m, :m], axis=1, kind="stable")[:, 1 : N_LINKS + 1]
     starts, ends = np.repeat(np.arange(m), near.shape[1]), near.ravel()
     one, two = np.concatenate([starts, ends]), np.concatenate([ends, starts])
@@ -183,8 +188,7 @@ def bend_part(
     turn = nearest_rotations(products[None])[0]
     turns = np.repeat(turn[None], len(frames), axis=0)
     places = target + (frames - middle) @ turn.T
-    m = len(frames)
-    places_in_matrix = (carriers[:, :, None] * m + carriers[:, None, :]).ravel()
+    matrix = np.empty(plan.graph.shape)
 
     for step, stiffness in enumerate(stiffnesses):
         if step >= N_GIVEN:
@@ -198,16 +202,16 @@ def bend_part(
             facing = np.clip(np.einsum("si,si->s", normals, planes), 0, 1)
             pull = plan.pull * plan.inner[nearest] * facing / (1 + (steps**2).sum(axis=1) / SOFT**2)
         # Move frames so that samples come nearer to their targets, and turn frames to follow.
-        entries = (pull[:, None] * portions)[:, :, None] * portions[:, None, :]
-        pulled = np.bincount(places_in_matrix, weights=entries.ravel(), minlength=m * m)
-        matrix = pulled.reshape(m, m) + stiffness * plan.graph
-        matrix[np.diag_indices_from(matrix)] += 1e-9 / m  # of frames that nothing pulls
-        factor, _ = cho_factor(matrix, check_finite=False)
+        # Frames that nothing pulls are held by a little more than 0.
+        least = 1e-9 / len(frames)
+        fill_stiffness(carriers, portions, pull, plan.graph, stiffness, least, matrix)
+        # The transpose lies in memory as LAPACK wants it, and is overwritten.
+        factor, _ = cho_factor(matrix.T, overwrite_a=True, check_finite=False)
         weight = stiffness * 2 / len(plan.one)  # as in `graph`
         for _ in range(N_FIRST if step == 0 else N_NEXT):
             right = np.zeros(places.shape)
-            add_pulls(turns, carriers, portions, plan.arms, pull, targets, right)
-            add_tensions(turns, plan.one, plan.two, plan.links, weight, right)
+            edges = plan.one, plan.two, plan.links, weight
+            add_forces(turns, carriers, portions, plan.arms, pull, targets, *edges, right)
             # LAPACK itself: the checks of `cho_solve` take as long as the solve.
             places = np.ascontiguousarray(dpotrs(factor, right)[0])
             turn_frames(places, plan.one, plan.two, plan.links, *FREE_SIZES, turns)
@@ -229,12 +233,8 @@ def _carry(
     vertices: Int[np.ndarray, " v"],
 ) -> tuple[Float[np.ndarray, "v 3"], Float[np.ndarray, "v 3"]]:
     """Return where frames, each a turn times a size at a place, carry vertices, and the normals there."""
-    mesh, carriers, portions = plan.part.mesh, plan.carriers[vertices], plan.portions[vertices]
-    centers = np.einsum("vc,vci->vi", portions, places[carriers])
-    arms = mesh.vertices[vertices][:, None] - mesh.vertices[plan.frames[carriers]]
-    turned = np.einsum("vcij,vcj->vci", turns[carriers], arms)
-    points = centers + np.einsum("vc,vci->vi", portions, turned)
-    blended = np.einsum("vc,vcij->vij", portions, turns[carriers])
-    normals = np.einsum("vij,vj->vi", blended, plan.part.normals[vertices])
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), TINY)
+    part = plan.part
+    carried = part.mesh.vertices, part.normals, plan.frames, plan.carriers, plan.portions
+    points, normals = np.empty((2, len(vertices), 3))
+    carry_vertices(turns, places, carried, vertices, points, normals)
     return points, normals

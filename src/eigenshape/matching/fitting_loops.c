@@ -4,9 +4,17 @@
 #include "space.h"
 
 enum { MOST_TURNS = 30 }; /* of one frame in one round; it ends at the first small turn */
+static const double SMALLEST = 0x1p-1022; /* a normal length, to divide by */
 static const double SMALLEST_TURN = 1e-4; /* radians; the next round starts from there */
 
 typedef double matrix[3][3];
+
+/* Vertices and normals of a part, its frames, and which of these carry each vertex how far. */
+struct carried {
+    const double (*vertices)[3], (*normals)[3];
+    const int64_t *frames, *carriers;
+    const double *portions;
+};
 
 /* Functions of the C library. */
 struct circle {
@@ -14,9 +22,31 @@ struct circle {
     double (*sine)(double);
 };
 
-KERNEL void add_pulls(const double (*turns)[3][3], const int64_t *carriers, const double *portions,
-                      const double (*arms)[3], const double *pull, const double (*targets)[3],
-                      double (*right)[3], int64_t n_samples, int64_t n_carriers) {
+KERNEL void fill_stiffness(const int64_t *carriers, const double *portions, const double *pull,
+                           const double *graph, double stiffness, double least, double *matrix,
+                           int64_t n_samples, int64_t n_carriers, int64_t n_frames) {
+    for (int64_t i = 0; i < n_frames; i++)
+        for (int64_t j = 0; j <= i; j++) matrix[i * n_frames + j] = 0;
+    for (int64_t s = 0; s < n_samples; s++) {
+        const int64_t *carrier = &carriers[s * n_carriers];
+        const double *portion = &portions[s * n_carriers];
+        for (int64_t c = 0; c < n_carriers; c++)
+            for (int64_t d = 0; d < n_carriers; d++)
+                if (carrier[c] <= carrier[d])
+                    matrix[carrier[d] * n_frames + carrier[c]] += pull[s] * portion[c] * portion[d];
+    }
+    for (int64_t i = 0; i < n_frames; i++) {
+        for (int64_t j = 0; j <= i; j++)
+            matrix[i * n_frames + j] += stiffness * graph[i * n_frames + j];
+        matrix[i * n_frames + i] += least;
+    }
+}
+
+KERNEL void add_forces(const double (*turns)[3][3], const int64_t *carriers, const double *portions,
+                       const double (*arms)[3], const double *pull, const double (*targets)[3],
+                       const int64_t *one, const int64_t *two, const double (*links)[3],
+                       double weight, double (*right)[3], int64_t n_samples, int64_t n_carriers,
+                       int64_t n_edges) {
     for (int64_t s = 0; s < n_samples; s++) {
         double rest[3] = {targets[s][0], targets[s][1], targets[s][2]};
         int64_t first = s * n_carriers, end = first + n_carriers;
@@ -27,18 +57,47 @@ KERNEL void add_pulls(const double (*turns)[3][3], const int64_t *carriers, cons
         for (int64_t c = first; c < end; c++)
             for (int d = 0; d < 3; d++) right[carriers[c]][d] += pull[s] * portions[c] * rest[d];
     }
-}
-
-KERNEL void add_tensions(const double (*turns)[3][3], const int64_t *one, const int64_t *two,
-                         const double (*arms)[3], double weight, double (*right)[3],
-                         int64_t n_edges) {
     for (int64_t edge = 0; edge < n_edges; edge++) {
         const double (*first)[3] = turns[one[edge]], (*second)[3] = turns[two[edge]];
         for (int d = 0; d < 3; d++) {
             double turned = 0;
             for (int e = 0; e < 3; e++)
-                turned += 0.5 * (first[d][e] + second[d][e]) * arms[edge][e];
+                turned += 0.5 * (first[d][e] + second[d][e]) * links[edge][e];
             right[one[edge]][d] -= weight * turned;
+        }
+    }
+}
+
+/* Write a matrix times a vector. */
+static void turn_arm(const double matrix[3][3], const double arm[3], double turned[3]) {
+    for (int d = 0; d < 3; d++)
+        turned[d] = matrix[d][0] * arm[0] + matrix[d][1] * arm[1] + matrix[d][2] * arm[2];
+}
+
+KERNEL void carry_vertices(const double (*turns)[3][3], const double (*places)[3],
+                           const struct carried *part, const int64_t *vertices, double (*points)[3],
+                           double (*normals)[3], int64_t n_vertices, int64_t n_carriers) {
+    for (int64_t number = 0; number < n_vertices; number++) {
+        int64_t v = vertices[number];
+        double center[3] = {0}, away[3] = {0}, blend[3][3] = {{0}}, normal[3];
+        for (int64_t c = v * n_carriers; c < (v + 1) * n_carriers; c++) {
+            int64_t frame = part->carriers[c];
+            double share = part->portions[c], arm[3], turned[3];
+            for (int d = 0; d < 3; d++)
+                arm[d] = part->vertices[v][d] - part->vertices[part->frames[frame]][d];
+            turn_arm(turns[frame], arm, turned);
+            for (int d = 0; d < 3; d++) {
+                center[d] += share * places[frame][d];
+                away[d] += share * turned[d];
+                for (int e = 0; e < 3; e++) blend[d][e] += share * turns[frame][d][e];
+            }
+        }
+        turn_arm(blend, part->normals[v], normal);
+        double square = normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2];
+        double length = maximum(square_root(square), SMALLEST);
+        for (int d = 0; d < 3; d++) {
+            points[number][d] = center[d] + away[d];
+            normals[number][d] = normal[d] / length;
         }
     }
 }

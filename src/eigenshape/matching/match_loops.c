@@ -12,8 +12,6 @@ struct shape {
     const complex64_t *ways;
 };
 
-static bool is_finite(double value) { return absolute(value) < INFINITE; }
-
 /* value · a · conj(b), rounded once at the end. */
 static complex64_t turn_between(double value, complex64_t a, complex64_t b) {
     /* The zeros are the imaginary part of the value: they keep the signs of zeros. */
@@ -24,31 +22,57 @@ static complex64_t turn_between(double value, complex64_t a, complex64_t b) {
                          (float)(real * b_imaginary + imaginary * b_real)};
 }
 
+enum { BLOCK = 256 };
+
+/* What the couplings of one pair take: its row of the distances of either shape. */
+struct row {
+    int64_t point;
+    const float *ours, *theirs;
+};
+
+/* By how much each of up to BLOCK pairs disagrees with the pair of a row, as a share of the slack: from
+   1 on, or no number where a distance is infinite, they do not support each other. Without branches,
+   so that several are computed at once. */
+static void fill_shares(const struct row *row, const int64_t *points, const int64_t *images,
+                        double slack, double least, double longer, double *shares,
+                        int64_t n_pairs) {
+    for (int64_t j = 0; j < n_pairs; j++) {
+        float one = row->ours[points[j]], two = row->theirs[images[j]], apart = one - two;
+        double error = absolute(apart) / maximum(maximum(one, two), least);
+        error *= one > two ? longer : 1;
+        shares[j] = error < slack && points[j] != row->point ? error / slack : 1;
+    }
+}
+
 /* Each row is written from left to right: to write both entries of two pairs at once, a column apart,
    takes three times as long. */
 KERNEL void couple_pairs(const int64_t *points, const int64_t *images, const struct shape *part,
                          const struct shape *whole, double slack, double least, double longer,
                          complex64_t *couplings, int64_t n_pairs, int64_t n_ours,
                          int64_t n_theirs) {
+    double shares[BLOCK];
     for (int64_t i = 0; i < n_pairs; i++) {
-        int64_t p = points[i], q = images[i];
-        for (int64_t j = 0; j < n_pairs; j++) {
-            complex64_t *coupling = &couplings[i * n_pairs + j];
-            *coupling = (complex64_t){0, 0};
-            int64_t ours = p * n_ours + points[j], theirs = q * n_theirs + images[j];
-            if (p == points[j]) continue;
-            float one = j < i ? part->forth[ours] : part->back[ours];
-            float two = j < i ? whole->forth[theirs] : whole->back[theirs];
-            if (!is_finite(one) || !is_finite(two)) continue;
-            float apart = one - two;
-            double error = absolute(apart) / maximum(maximum(one, two), least);
-            if (one > two) error *= longer;
-            if (!(error < slack)) continue;
-            double share = error / slack;
-            *coupling = turn_between(1 - share * share, whole->ways[theirs], part->ways[ours]);
+        int64_t ours = points[i] * n_ours, theirs = images[i] * n_theirs;
+        /* The distance of two pairs is that from the later one. */
+        struct row earlier = {points[i], &part->forth[ours], &whole->forth[theirs]};
+        struct row later = {points[i], &part->back[ours], &whole->back[theirs]};
+        for (int64_t first = 0, end; first < n_pairs; first = end) {
+            end = lesser(first + BLOCK, first < i ? i : n_pairs);
+            fill_shares(first < i ? &earlier : &later, &points[first], &images[first], slack, least,
+                        longer, shares, end - first);
+            for (int64_t j = first; j < end; j++) {
+                double share = shares[j - first];
+                complex64_t *coupling = &couplings[i * n_pairs + j];
+                *coupling = (complex64_t){0, 0};
+                if (share < 1)
+                    *coupling = turn_between(1 - share * share, whole->ways[theirs + images[j]],
+                                             part->ways[ours + points[j]]);
+            }
         }
     }
 }
+
+static bool is_finite(double value) { return absolute(value) < INFINITE; }
 
 /* Row by row, as they lie in memory; each column keeps the least entries so far in order. */
 KERNEL void fill_nearest_rows(const double *rows, double *least, int64_t *found, int64_t n_rows,

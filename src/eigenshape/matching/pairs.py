@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Bool, Complex64, Float, Int
 
 from certeig.kit.arrays import record
-from eigenshape.geometry.facet_lists import label_components
+from eigenshape._arrays import label_components
 from eigenshape.matching.match_loops import couple_pairs, nearest_rows, place_by_distances
 from eigenshape.matching.surface import Surface, View
 

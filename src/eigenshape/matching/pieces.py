@@ -10,12 +10,12 @@ from jaxtyping import Float, Int
 from scipy.spatial import cKDTree
 
 from certeig.kit.arrays import ReadOnly, record
+from eigenshape._errors import count_nouns
 from eigenshape.geometry.face_turns import inconsistent_edges
 from eigenshape.geometry.measure import edge_lengths, face_areas, mean_normals, surface_area
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.orientation import orient_outward
 from eigenshape.geometry.repairs.repair import repair
-from eigenshape.geometry.repairs.repair_report import count_nouns
 from eigenshape.geometry.repairs.repair_steps import largest_component
 from eigenshape.geometry.resolution.thinning import thin_out
 from eigenshape.geometry.topology import edge_table, submesh, vertex_components

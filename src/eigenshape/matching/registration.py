@@ -13,8 +13,9 @@ from certeig.kit.arrays import ReadOnly, record
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike
 from eigenshape._arrays import finite_rows
+from eigenshape._vectors import nearest_rotations
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.measure import mean_normals, nearest_rotations
+from eigenshape.geometry.measure import mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.orientation import orient_outward
 from eigenshape.geometry.simplices import dual_volumes

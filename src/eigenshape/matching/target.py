@@ -9,7 +9,7 @@ from certeig.kit.arrays import record
 from certeig.kit.text import html_repr
 from certeig.kit.threads import map_in_threads, one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.distances.geodesic import unchecked_waves
+from eigenshape.geometry.distances.geodesic import unchecked_rows
 from eigenshape.geometry.measure import mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_describable, require_oriented
@@ -157,9 +157,7 @@ def describe_views(mesh: TriangleMesh, points: Int[np.ndarray, " m"]) -> tuple[V
         places[sources] = np.arange(piece.n_vertices)
         seen = np.flatnonzero(places[points] >= 0)
         chosen = places[points[seen]]
-        wave, reach = unchecked_waves(piece), float(MATCHED_RADII[-1])
-        rows = np.array([wave(vertex, reach) for vertex in chosen[:, None]])
-        rows = rows.reshape(len(chosen), piece.n_vertices)
+        rows = unchecked_rows(piece)(chosen, np.arange(1, len(chosen) + 1), MATCHED_RADII[-1])
         normals, areas = mean_normals(piece), dual_volumes(piece)
         numbers = describe_discs(piece, chosen, rows, MATCHED_RADII, normals, areas)
         weights = whole_shares(piece, rows, MATCHED_RADII).astype(np.float32)

@@ -10,11 +10,12 @@ from certeig.kit.arrays import ReadOnly, record
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.progress import Progress
 from certeig.kit.threads import one_blas_thread
+from eigenshape._arrays import label_components
+from eigenshape._vectors import fit_similarities
 from eigenshape.calculus.energies import solve_harmonic
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.distances.closest import closest_points
-from eigenshape.geometry.facet_lists import label_components
-from eigenshape.geometry.measure import edge_lengths, fit_similarities, surface_area
+from eigenshape.geometry.measure import edge_lengths, surface_area
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.samples.surface_points import SurfacePoints, place_points
 from eigenshape.geometry.simplices import dual_volumes

@@ -10,7 +10,7 @@ from certeig.kit.errors import InvalidParameterError
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike
 from eigenshape._arrays import point_functions, vertex_values
-from eigenshape.geometry.simplices import size_one
+from eigenshape._vectors import size_one
 from eigenshape.spectral.spectrum import Spectrum
 
 # Least eigenvalue of ΦᵀDΦ, relative to the largest, at which weighted points still tell modes apart.

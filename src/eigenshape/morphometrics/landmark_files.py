@@ -28,7 +28,12 @@ from eigenshape.morphometrics.landmark_parsers import (
     sections_of,
     unlabeled,
 )
-from eigenshape.morphometrics.landmarks import Landmarks, require_name, require_same_names
+from eigenshape.morphometrics.landmarks import (
+    Landmarks,
+    require_name,
+    require_same_names,
+    shared_curves,
+)
 from eigenshape.morphometrics.tps_files import parse_tps
 
 SCHEMA = (
@@ -262,14 +267,16 @@ def write_landmarks(landmarks: Landmarks | Mapping[str, Landmarks], path: str | 
     path : str or Path
         Must end in `.mrk.json`, `.fcsv` (one specimen, in the system LPS), `.tps`, `.txt`
         (Morphologika) or `.csv`. Rows of a `.csv` file are in the order that `arrayspecs` of
-        geomorph takes.
+        geomorph takes. A `.sliders.csv` file has no points but a row for each semilandmark of the
+        curves, with the numbers of the point before, its own and the one after, counted from 1, as
+        `gpagen(curves = )` of geomorph takes it.
 
     Raises
     ------
     FileFormatError
         If the name ends otherwise.
     InvalidParameterError
-        If the format holds one specimen and there are several, there is none, landmarks of
+        If the format holds one specimen and there are several, there is none, landmarks or curves of
         specimens differ, or the name of one is empty, holds a line break, or begins with [ where
         that begins a section.
     OSError
@@ -433,6 +440,14 @@ def csv_text(rows: Iterable[Iterable[object]]) -> str:
     return lines.getvalue()
 
 
+def _format_sliders(specimens: Table) -> str:
+    rows: list[tuple[object, ...]] = [("before", "slide", "after")]
+    for curve in shared_curves(specimens):
+        numbers = [row + 1 for row in curve]  # R counts from 1
+        rows += zip(numbers[:-2], numbers[1:-1], numbers[2:], strict=True)
+    return csv_text(rows)
+
+
 def _format_tps(specimens: Table) -> str:
     lines = []
     for name, landmarks in specimens.items():
@@ -518,6 +533,7 @@ WRITERS = {
     ".fcsv": _format_fcsv,
     ".tps": _format_tps,
     ".txt": _format_morphologika,
+    ".sliders.csv": _format_sliders,
     ".csv": _format_csv,
 }
 OF_ONE = (".mrk.json", ".fcsv")

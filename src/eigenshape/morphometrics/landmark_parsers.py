@@ -14,10 +14,7 @@ Table: TypeAlias = dict[str, Landmarks]
 
 MISSING = ("", "NA")  # of a number, as R, pandas and tps programs write it, beside NaN
 NOT_PLACED = 9999.0  # each coordinate of a point that Landmark Editor has not placed
-PLANAR = (
-    "its points are in a plane and are read with z = 0; fit_procrustes does not tell a planar form "
-    "from its mirror image"
-)
+PLANAR = "its points are in a plane and are read with z = 0"
 
 
 class Parsed(NamedTuple):

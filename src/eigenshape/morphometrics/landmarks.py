@@ -190,3 +190,21 @@ def require_same_names(specimens: Mapping[Any, Landmarks], name: str = "specimen
             )
     if not names:
         raise InvalidParameterError("There must be at least one specimen with a landmark.")
+
+
+def shared_curves(
+    specimens: Mapping[Any, Landmarks], name: str = "specimens"
+) -> tuple[tuple[int, ...], ...]:
+    """Return the curves of all specimens that have some; raise an error if those of two differ.
+
+    `name` is that of the argument.
+    """
+    drawn = {specimen: own.curves for specimen, own in specimens.items() if own.curves}
+    first = next(iter(drawn), None)
+    for specimen, curves in drawn.items():
+        if curves != drawn[first]:
+            raise InvalidParameterError(
+                f"All curves of {name} must have the same rows; {first!r} has {drawn[first]}, and "
+                f"{specimen!r} {curves}. Draw them on one, and carry them to the others."
+            )
+    return drawn.get(first, ())

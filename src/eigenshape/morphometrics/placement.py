@@ -8,8 +8,9 @@ from jaxtyping import Float
 from scipy.spatial import cKDTree
 
 from certeig.kit.errors import InvalidParameterError
+from eigenshape._vectors import mean_radius
 from eigenshape.geometry.distances.closest import closest_points
-from eigenshape.geometry.measure import edge_lengths, mean_radius
+from eigenshape.geometry.measure import edge_lengths
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.morphometrics.landmarks import Landmarks
 
@@ -47,7 +48,7 @@ def require_on_surfaces(
     found, wrong = {}, []
     for name, mesh, landmarks in specimens:
         radius, edge = mean_radius(mesh.vertices), float(edge_lengths(mesh).mean())
-        farthest = max(OUTSIDE * radius, edge)
+        farthest = farthest_place(mesh)
         known = np.isfinite(landmarks.points).all(axis=1)
         distances = np.full(len(known), np.nan)
         distances[known] = _distances(mesh, landmarks.points[known])
@@ -65,6 +66,11 @@ def require_on_surfaces(
             f"Landmarks must lie on the surface of their specimen. {' '.join(wrong)}"
         )
     return found
+
+
+def farthest_place(mesh: TriangleMesh) -> float:
+    """Return the distance from a surface above which no point of it lies."""
+    return max(OUTSIDE * mean_radius(mesh.vertices), float(edge_lengths(mesh).mean()))
 
 
 def _distances(mesh: TriangleMesh, points: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, " k"]:

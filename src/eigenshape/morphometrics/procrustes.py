@@ -1,27 +1,31 @@
 """Shapes: points of specimens without place, turn and size, and with semilandmarks slid."""
 
 from collections.abc import Sequence
+from typing import Literal, NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Int
 from scipy.linalg import lstsq
+from scipy.spatial.distance import cdist
 from scipy.stats import iqr
 
-from certeig.kit.arrays import ReadOnly, real_numbers, record
+from certeig.kit.arguments import require_choice
+from certeig.kit.arrays import ReadOnly, real_numbers, record, whole_numbers
 from certeig.kit.errors import ConvergenceError, InvalidParameterError
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike
-from eigenshape.geometry.measure import nearest_rotations, rotations_and_stretches
+from eigenshape._vectors import nearest_rotations, rotations_and_stretches
 from eigenshape.morphometrics.landmarks import Specimens, as_curves, complete_points
 from eigenshape.morphometrics.splines import bending_matrix
 
 TOLERANCE, MOST_ROUNDS = 1e-10, 200  # 31 skulls of mice rest after 6 rounds
-# Semilandmarks slide as long as a round takes this share off their energy, one to four rounds. After
-# that they would all drift along their curves together, which changes shapes no more.
-LEAST_GAIN = 0.01
-FENCE = (
-    1.5  # interquartile ranges above the upper quartile, beyond which Tukey calls a value far out
-)
+# Semilandmarks slide until the squared length of the sum of all shapes, divided by their number,
+# changes by less, or for as many rounds: with more they would all drift along their curves together,
+# which changes shapes no more. Both are the defaults of `gpagen` in geomorph 4.0 (`tol`, `max.iter`).
+LEAST_CHANGE, MOST_SLIDES = 1e-4, 9
+N_SPANNING = 5  # points that span the plane in which one of them slides, itself among them; `gpagen`
+# Interquartile ranges above the upper quartile, beyond which Tukey calls a value far out
+FENCE = 1.5
 
 
 @record
@@ -33,10 +37,11 @@ class ProcrustesFit(ReadOnly):
     mean : (k, 3) float
         The mean shape, of centroid size 1 about the origin.
     shapes : (n, k, 3) float
-        The specimens, of centroid size 1 about the origin, turned to the mean.
+        The specimens, of centroid size 1 about the origin, turned to the mean. Semilandmarks then
+        slid, by which size and middle change a little.
     sizes : (n,) float
-        Centroid sizes: roots of the sums of squared distances from the middle, in length, of what
-        semilandmarks slid to.
+        Centroid sizes: roots of the sums of squared distances from the middle, in length, of the
+        points that were given.
 
     See Also
     --------
@@ -61,9 +66,12 @@ class ProcrustesFit(ReadOnly):
     @one_blas_thread()
     def distances(self) -> Float[np.ndarray, "n n"]:
         """Return the Procrustes distances of all pairs, each pair turned on one another anew."""
-        # With the best turn, |x - R y|² = 2 - 2 (sum of the signed stretches of xᵀy).
-        products = np.tensordot(self.shapes, self.shapes, axes=(1, 1)).swapaxes(1, 2)
-        squares = 2 - 2 * rotations_and_stretches(products)[1].sum(axis=-1)
+        # With the best turn, |x - R y|² = |x|² + |y|² - 2 (sum of the signed stretches of xᵀy).
+        shapes = _flattened(self.shapes)
+        products = np.tensordot(shapes, shapes, axes=(1, 1)).swapaxes(1, 2)
+        lengths = np.sum(shapes**2, axis=(1, 2))
+        squares = np.add.outer(lengths, lengths)
+        squares -= 2 * rotations_and_stretches(products)[1].sum(axis=-1)
         np.fill_diagonal(squares, 0)
         return np.sqrt(np.maximum(squares, 0))
 
@@ -84,17 +92,21 @@ def fit_procrustes(
     specimens: Specimens,
     *,
     curves: Sequence[Sequence[int]] = (),
+    surfaces: Sequence[int] = (),
     normals: ArrayLike | None = None,
+    minimize: Literal["bending", "distance"] = "bending",
 ) -> ProcrustesFit:
     """Remove place, turn and size from specimens of corresponding points.
 
     Each is divided by its centroid size and turned on the mean, which is computed anew until it
     rests (generalized Procrustes analysis: Gower 1975; Dryden and Mardia 1998, section 5.4, partial
-    fits). Nothing is reflected.
+    fits). Nothing is reflected. If the points of each specimen have one z, they turn in their plane.
 
     Semilandmarks slide along tangents of the curve or the surface, to where the thin-plate spline
-    from the mean has the least bending energy (Gunz, Mitteroecker and Bookstein 2005). They stay on
-    the tangents of where they were given.
+    from the mean has the least bending energy (Bookstein 1997; Gunz, Mitteroecker and Bookstein 2005),
+    or to where the Procrustes distance from the mean is least (Rohlf 2010). After each step tangents
+    and mean are computed anew, 9 times at most. Steps, tangents and rounds are those of `gpagen` in
+    the R package geomorph 4.0 with Proj = FALSE and PrinAxes = FALSE, and so are the results.
 
     Parameters
     ----------
@@ -103,8 +115,13 @@ def fit_procrustes(
     curves : sequence of sequences of int, optional
         Rows of the points of curves, as `Landmarks.curves`: all but the first and last one slide,
         along the line from their neighbor to the next.
+    surfaces : sequence of int, optional
+        Rows of points that slide on the surface, in the plane through the point and its four nearest
+        ones, or across its normal.
     normals : (n, k, 3) float, optional
         Normals of the surface at points that slide on it; rows of NaN for all others.
+    minimize : {"bending", "distance"}, optional
+        The bending energy, or the Procrustes distance, where neighbors may pass one another.
 
     Returns
     -------
@@ -113,14 +130,15 @@ def fit_procrustes(
     Raises
     ------
     InvalidParameterError
-        If a point is missing or infinite, all points of a specimen coincide, or landmarks of
-        specimens, curves or normals do not fit together.
+        If a point is missing or infinite, all points of a specimen coincide, landmarks of
+        specimens, curves, surfaces or normals do not fit together, or `minimize` is another word.
     ConvergenceError
         If the mean does not rest after 200 rounds.
 
     See Also
     --------
     estimate_missing : Fill in points that are missing.
+    resample_curves : Space semilandmarks evenly first.
     principal_components : The modes in which shapes vary.
 
     Examples
@@ -132,29 +150,34 @@ def fit_procrustes(
     >>> fit.distances().shape, np.linalg.norm(fit.shapes, axis=(1, 2)).round(6).tolist()
     ((5, 5), [1.0, 1.0, 1.0, 1.0, 1.0])
     """
+    require_choice(minimize, Literal["bending", "distance"], "minimize")
     points = complete_points(specimens)
-    rows, tangents = _tangents(points, curves, normals)
-    slid, mean, energy = points, None, np.inf
-    is_sliding = len(rows) > 0
-    for _ in range(MOST_ROUNDS):
-        centered = slid - slid.mean(axis=1, keepdims=True)
-        sizes = np.linalg.norm(centered, axis=(1, 2))
-        shapes = centered / sizes[:, None, None]
-        last = shapes[0] if mean is None else mean
-        # The best turn of each (Kabsch 1976), without reflection
-        shapes = shapes @ nearest_rotations(np.einsum("nki,kj->nij", shapes, last))
+    sliders, normals = _sliders(points, curves, surfaces, normals)
+    places = points if len(sliders.patch) else _flattened(points)
+    centered = places - places.mean(axis=1, keepdims=True)
+    sizes = np.linalg.norm(centered, axis=(1, 2))
+    shapes, normals = _turn(centered / sizes[:, None, None], normals, centered[0])
+    mean = shapes.mean(axis=0)  # of which `gpagen` does not take the size in the first round
+    length = np.sum(mean**2)
+    for number in range(MOST_ROUNDS):
+        last, last_length = mean, length
+        if len(sliders.rows):
+            weights = bending_matrix(mean) if minimize == "bending" else np.eye(len(mean))
+            pairs = zip(shapes, normals, strict=True)
+            shapes = np.stack([sliders.slide(*pair, mean, weights) for pair in pairs])
+            length = np.sum(shapes.mean(axis=0) ** 2)
+        shapes, normals = _turn(shapes, normals, mean)
         mean = shapes.mean(axis=0)
-        mean /= np.linalg.norm(mean)
-        if np.linalg.norm(mean - last) < TOLERANCE and not is_sliding:
-            return ProcrustesFit(mean, shapes, sizes)
-        if is_sliding:
-            bending = bending_matrix(mean)
-            slid = np.stack(
-                [_slide(*each, rows, bending) for each in zip(points, tangents, strict=True)]
-            )
-            highest = (1 - LEAST_GAIN) * energy
-            energy = np.sum(slid * (bending @ slid) / sizes[:, None, None] ** 2)
-            is_sliding = energy < highest
+        mean /= np.linalg.norm(mean - mean.mean(axis=0))
+        if len(sliders.rows):
+            change = len(shapes) * abs(length - last_length)
+            rests = number + 1 == MOST_SLIDES or change <= LEAST_CHANGE
+        else:
+            rests = np.linalg.norm(mean - last) < TOLERANCE
+        if rests:
+            mean = mean - mean.mean(axis=0)
+            lacking = ((0, 0), (0, 3 - mean.shape[1]))
+            return ProcrustesFit(np.pad(mean, lacking), np.pad(shapes, ((0, 0), *lacking)), sizes)
     raise ConvergenceError(
         f"The mean shape must rest; after {MOST_ROUNDS} rounds it moves by "
         f"{np.linalg.norm(mean - last):.1g} of its size. The specimens are not alike: "
@@ -162,43 +185,91 @@ def fit_procrustes(
     )
 
 
-def _tangents(
-    points: Float[np.ndarray, "n k 3"], curves: Sequence[Sequence[int]], normals: ArrayLike | None
-) -> tuple[Int[np.ndarray, " t"], Float[np.ndarray, "n t 3"]]:
-    """Return rows of points that slide, and a direction for each; two for points of a surface."""
-    rows: list[int] = []
-    tangents = []
-    for curve in as_curves(curves, points.shape[1]):
-        rows += curve[1:-1]
-        along = points[:, curve[2:]] - points[:, curve[:-2]]
-        lengths = np.linalg.norm(along, axis=2, keepdims=True)
-        tangents.append(along / np.where(lengths > 0, lengths, 1))
-    if normals is not None:
-        given = real_numbers(normals, "normals").astype(np.float64)
-        if given.shape != points.shape:
-            raise InvalidParameterError(
-                f"normals must have the shape of the specimens, {points.shape}; it is {given.shape}."
-            )
-        on_surface = np.flatnonzero(np.isfinite(given).all(axis=(0, 2)))
+def _flattened(points: Float[np.ndarray, "n k 3"]) -> Float[np.ndarray, "n k d"]:
+    """Return points without z if that of each specimen is one: a turn in space could reflect them."""
+    return points if np.ptp(points[..., 2], axis=1).any() else points[..., :2]
+
+
+def _turn(
+    shapes: Float[np.ndarray, "n k d"],
+    normals: Float[np.ndarray, "n u 3"],
+    goal: Float[np.ndarray, "k d"],
+) -> tuple[Float[np.ndarray, "n k d"], Float[np.ndarray, "n u 3"]]:
+    """Give each shape the best turn onto another one, without reflection (Kabsch 1976)."""
+    turns = nearest_rotations(np.einsum("nki,kj->nij", shapes, goal))
+    return shapes @ turns, normals @ turns if normals.size else normals
+
+
+class _Sliders(NamedTuple):
+    """Rows of semilandmarks: first those of curves, between two neighbors, then twice each of a patch."""
+
+    rows: Int[np.ndarray, " s"]
+    before: Int[np.ndarray, " t"]
+    after: Int[np.ndarray, " t"]
+    patch: Int[np.ndarray, " u"]
+
+    def slide(
+        self,
+        shape: Float[np.ndarray, "k d"],
+        normals: Float[np.ndarray, "u 3"],
+        mean: Float[np.ndarray, "k d"],
+        weights: Float[np.ndarray, "k k"],
+    ) -> Float[np.ndarray, "k d"]:
+        """Move points along tangents U to the least (Y - M)ᵀ B (Y - M): by -(Uᵀ B U)⁻¹ Uᵀ B (Y - M).
+
+        B is the bending matrix of the mean M, or for the Procrustes distance the identity (Gunz,
+        Mitteroecker and Bookstein 2005).
+        """
+        rows = self.rows
+        chords = shape[self.after] - shape[self.before]
+        lengths = np.linalg.norm(chords, axis=1, keepdims=True)
+        tangents = chords / np.where(lengths > 0, lengths, 1)
+        if len(self.patch):
+            tangents = np.concatenate([tangents, self._planes(shape, normals)])
+        system = weights[np.ix_(rows, rows)] * (tangents @ tangents.T)
+        forces = np.sum(tangents * (weights @ (shape - mean))[rows], axis=1)
+        # Where nothing holds a semilandmark, the shortest of all solutions
+        steps = lstsq(system, -forces, lapack_driver="gelsy")[0]
+        slid = shape.copy()
+        np.add.at(slid, rows, steps[:, None] * tangents)
+        return slid
+
+    def _planes(
+        self, shape: Float[np.ndarray, "k 3"], normals: Float[np.ndarray, "u 3"]
+    ) -> Float[np.ndarray, "v 3"]:
+        """Return two directions for each point of a patch: across its normal if it is known."""
+        order = np.argsort(cdist(shape[self.patch], shape), axis=1, kind="stable")
+        nearest = shape[order[:, :N_SPANNING]]
+        spokes = nearest - nearest.mean(axis=1, keepdims=True)
+        guessed = np.linalg.svd(spokes)[2][:, 2]
+        across = np.where(np.isfinite(normals), normals, guessed)
         # The two singular vectors beside the normal span the tangent plane.
-        planes = np.linalg.svd(given[:, on_surface, None])[2][:, :, 1:]
-        rows += np.repeat(on_surface, 2).tolist()
-        tangents.append(planes.reshape(len(points), -1, 3))
-    directions = np.concatenate(tangents, axis=1) if tangents else np.empty((len(points), 0, 3))
-    return np.array(rows, dtype=np.int64), directions
+        return np.linalg.svd(across[:, None])[2][:, 1:].reshape(-1, 3)
 
 
-def _slide(
-    points: Float[np.ndarray, "k 3"],
-    tangents: Float[np.ndarray, "t 3"],
-    rows: Int[np.ndarray, " t"],
-    bending: Float[np.ndarray, "k k"],
-) -> Float[np.ndarray, "k 3"]:
-    """Return points moved along tangents to the least bending energy, tr(Yᵀ L Y)."""
-    system = bending[np.ix_(rows, rows)] * (tangents @ tangents.T)
-    forces = np.sum(tangents * (bending @ points)[rows], axis=1)
-    # Where nothing holds a semilandmark, the shortest of all solutions
-    steps = lstsq(system, -forces, lapack_driver="gelsy")[0]
-    slid = points.copy()
-    np.add.at(slid, rows, steps[:, None] * tangents)
-    return slid
+def _sliders(
+    points: Float[np.ndarray, "n k 3"],
+    curves: Sequence[Sequence[int]],
+    surfaces: Sequence[int],
+    normals: ArrayLike | None,
+) -> tuple[_Sliders, Float[np.ndarray, "n u 3"]]:
+    """Return what slides, and the normals of points in patches, NaN where they are not known."""
+    n_points = points.shape[1]
+    patch = whole_numbers(list(surfaces), "surfaces", 0, n_points - 1)
+    across = np.full(points.shape, np.nan)
+    if normals is not None:
+        across = real_numbers(normals, "normals").astype(np.float64)
+        if across.shape != points.shape:
+            raise InvalidParameterError(
+                f"normals must have the shape of the specimens, {points.shape}; it is {across.shape}."
+            )
+    is_known = np.isfinite(across).all(axis=(0, 2))
+    patch = np.union1d(patch, np.flatnonzero(is_known)).astype(np.int64)
+    threes = [
+        three
+        for curve in as_curves(curves, n_points)
+        for three in zip(curve[:-2], curve[1:-1], curve[2:], strict=True)
+    ]
+    before, along, after = np.reshape(threes, (-1, 3)).astype(np.int64).T
+    rows = np.concatenate([along, np.repeat(patch, 2)])
+    return _Sliders(rows, before, after, patch), across[:, patch]

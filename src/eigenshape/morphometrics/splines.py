@@ -5,6 +5,7 @@ from jaxtyping import Float
 from scipy.interpolate import RBFInterpolator
 from scipy.linalg import null_space
 from scipy.spatial.distance import cdist
+from scipy.special import xlogy
 
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.threads import one_blas_thread
@@ -15,14 +16,17 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.morphometrics.landmarks import complete_points
 
 
-def bending_matrix(points: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "k k"]:
+def bending_matrix(points: Float[np.ndarray, "k d"]) -> Float[np.ndarray, "k k"]:
     """Return L, so that a spline from these points to Y has the bending energy tr(Yᵀ L Y).
 
-    The kernel in space is -r (Bookstein 1989). L is the inverse of its matrix among functions that
-    no affine map can make: L = Q (Qᵀ K Q)⁻¹ Qᵀ, with Q the null space of (1, points)ᵀ.
+    The kernel is -r in space and r² log r in a plane (Bookstein 1989). L is the inverse of its matrix
+    among functions that no affine map can make: L = Q (Qᵀ K Q)⁻¹ Qᵀ, with Q the null space of
+    (1, points)ᵀ.
     """
     free = null_space(np.column_stack([np.ones(len(points)), points]).T)
-    kernel = free.T @ -cdist(points, points) @ free
+    distances = cdist(points, points)
+    kernel = -distances if points.shape[1] == 3 else xlogy(distances**2, distances)
+    kernel = free.T @ kernel @ free
     return free @ np.linalg.pinv(kernel, hermitian=True) @ free.T
 
 

@@ -7,8 +7,8 @@ from certeig.kit.arguments import require_choice
 from certeig.kit.errors import InvalidParameterError
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
 from eigenshape.geometry.measure import surface_area, vertex_normals
-from eigenshape.geometry.requirements import require_sound
-from eigenshape.geometry.simplices import require_volumes, scaled_corners, triangular_sides
+from eigenshape.geometry.requirements import require_sound, require_volumes
+from eigenshape.geometry.simplices import scaled_corners, triangular_sides
 from eigenshape.operators import elements
 from eigenshape.operators.choices import Mass
 from eigenshape.operators.cotangent import linear_laplacian

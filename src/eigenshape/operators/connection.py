@@ -5,14 +5,17 @@ import scipy.sparse as sp
 from jaxtyping import Complex, Float
 
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import size_one
+from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_areas, vertex_normals
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.simplices import size_one
 from eigenshape.operators.choices import Mass
+from eigenshape.operators.clouds.cloud_triangles import cloud_normals
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.directions import half_cotangents, vertex_directions
 from eigenshape.operators.laplacian import Laplacian
+from eigenshape.operators.robust import robust_laplacian
 from eigenshape.operators.tufted import edge_keys, side_ends
 
 # Entry of the mass matrix for two corners of a face, as a share of the area of the face.
@@ -21,8 +24,8 @@ MASS_SHARES = {"lumped": 0.0, "consistent": 1 / 12, "averaged": 1 / 24}
 COCIRCULAR = 1e-14
 
 
-def connection_laplacian(mesh: MeshLike, mass: Mass = "lumped") -> Laplacian:
-    """Build the Laplacian of tangent vector fields, with the Levi-Civita connection of the mesh.
+def connection_laplacian(mesh: MeshLike | PointCloud, mass: Mass = "lumped") -> Laplacian:
+    """Build the Laplacian of tangent vector fields, with the Levi-Civita connection of the surface.
 
     The energy of W is Σ_ij w_ij |v_j - r_ij v_i|², with cotangent weights w_ij and r_ij the
     rotation that transports a vector along the edge from vertex i to vertex j (Knöppel, Crane,
@@ -36,16 +39,22 @@ def connection_laplacian(mesh: MeshLike, mass: Mass = "lumped") -> Laplacian:
     that the transport around the face is the identity. The rotation is of the order of curvature
     times squared edge length, as is the discretization error.
 
+    On a point cloud the weights are those of `robust_laplacian`, which are at least 0, and r_ij is the
+    least turn in space that takes one tangent plane to the other (Sharp, Soliman, Crane 2019, section
+    7.2). It reflects where the normals of two points look to different sides, so these sides do not
+    matter.
+
     Unlike in a scalar Laplacian the rows of W do not sum to 0: only parallel fields have no energy,
     and on a curved surface there are none.
 
     Parameters
     ----------
-    mesh : MeshLike
-        A manifold, with or without boundary, with consistently oriented faces.
+    mesh : MeshLike or PointCloud
+        A manifold, with or without boundary, with consistently oriented faces; or points of a surface
+        in R³.
     mass : {"lumped", "consistent", "averaged"}
         As in `cotangent_laplacian`. The consistent mass transports vectors as W does, in faces made
-        flat.
+        flat. That of a point cloud is lumped.
 
     Returns
     -------
@@ -58,7 +67,7 @@ def connection_laplacian(mesh: MeshLike, mass: Mass = "lumped") -> Laplacian:
     InvalidShapeError
         If an edge has more than two faces, a vertex has no face or more than one fan of faces, two
         neighboring faces have opposite orientations, a face has no area, or coordinates are beyond
-        1e±150.
+        1e±150; of a point cloud as in `robust_laplacian`.
     InvalidParameterError
         If `mass` is not one of the three.
 
@@ -76,6 +85,8 @@ def connection_laplacian(mesh: MeshLike, mass: Mass = "lumped") -> Laplacian:
     >>> bool(es.solve_spectrum(laplacian, 1).eigenvalues[0] > 0.9)  # no parallel field
     True
     """
+    if isinstance(mesh, PointCloud):
+        return _cloud_connection(mesh)
     mesh = as_mesh(mesh)
     scalar = cotangent_laplacian(mesh, mass)
     sides = vertex_directions(mesh)
@@ -100,17 +111,21 @@ def connection_laplacian(mesh: MeshLike, mass: Mass = "lumped") -> Laplacian:
     return Laplacian(as_real(stiffness), as_real(masses))
 
 
-def tangent_frames(mesh: MeshLike) -> Float[np.ndarray, "n 2 3"]:
-    """Compute two orthonormal tangent vectors at each vertex.
+def tangent_frames(mesh: MeshLike | PointCloud) -> Float[np.ndarray, "n 2 3"]:
+    """Compute two orthonormal tangent vectors at each vertex, or point of a cloud.
 
     The first is the direction of the first edge of the vertex, made orthogonal to the area-weighted
     mean normal of its faces. The second is a quarter turn further, counter-clockwise seen from
     outside. The first edge of an inner vertex is that of its first face; the first edge of a
     boundary vertex is the boundary edge with a face on its left.
 
+    The tangent plane of a point of a cloud is the best plane of its 30 nearest neighbors through it.
+    The first vector lies in the plane along that coordinate axis which the normal is farthest from;
+    the largest coordinate of the normal, from which the second is a quarter turn further, is positive.
+
     Parameters
     ----------
-    mesh : MeshLike
+    mesh : MeshLike or PointCloud
 
     Returns
     -------
@@ -120,7 +135,7 @@ def tangent_frames(mesh: MeshLike) -> Float[np.ndarray, "n 2 3"]:
     Raises
     ------
     InvalidShapeError
-        As in `connection_laplacian`; or if the normals of the faces at a vertex cancel, or its
+        As in `connection_laplacian`, or `local_triangles`; or if the normals of the faces at a vertex cancel, or its
         first edge is parallel to the normal.
 
     Examples
@@ -129,6 +144,12 @@ def tangent_frames(mesh: MeshLike) -> Float[np.ndarray, "n 2 3"]:
     >>> es.operators.tangent_frames(es.shapes.grid(1, 1)).shape
     (4, 2, 3)
     """
+    if isinstance(mesh, PointCloud):
+        normals = cloud_normals(mesh)
+        axes = np.eye(3)[np.abs(normals).argmin(axis=1)]
+        first = axes - np.einsum("nd,nd->n", axes, normals)[:, None] * normals
+        first /= np.linalg.norm(first, axis=1, keepdims=True)
+        return np.stack([first, np.cross(normals, first)], axis=1)
     mesh = as_mesh(mesh)
     sides = vertex_directions(mesh)
     points, _ = size_one(mesh.vertices)
@@ -146,6 +167,19 @@ def tangent_frames(mesh: MeshLike) -> Float[np.ndarray, "n 2 3"]:
         )
     first = along / left[:, None]
     return np.stack([first, np.cross(normals, first)], axis=1)
+
+
+def _cloud_connection(cloud: PointCloud) -> Laplacian:
+    scalar, frames = robust_laplacian(cloud), tangent_frames(cloud)
+    entries = scalar.stiffness.tocsr()
+    rows = np.repeat(np.arange(cloud.n_points), np.diff(entries.indptr))
+    # The least turn is the orthogonal factor of the projection of one plane on the other.
+    left, _, right = np.linalg.svd(frames[rows] @ frames[entries.indices].swapaxes(1, 2))
+    blocks = entries.data[:, None, None] * (left @ right)
+    stiffness = sp.bsr_array((blocks, entries.indices, entries.indptr)).tocsr()
+    # Rounding of both turns along an edge
+    stiffness = (stiffness + stiffness.T) / 2
+    return Laplacian(stiffness, sp.kron(scalar.mass, sp.eye_array(2)).tocsr())
 
 
 def flatten_turns(turns: Complex[np.ndarray, " h"]) -> Complex[np.ndarray, " h"]:

@@ -7,13 +7,14 @@ import scipy.sparse as sp
 
 from certeig.kit.arguments import require_choice
 from certeig.kit.errors import InvalidParameterError
-from certeig.matrices import require_square
+from certeig.kit.matrices import require_square
+from eigenshape._arrays import adjacency_matrix
 from eigenshape._errors import InvalidShapeError, try_auto
+from eigenshape._vectors import size_one
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.homology import edges_of
-from eigenshape.geometry.simplices import in_length, size_one
+from eigenshape.geometry.simplices import in_length
 from eigenshape.geometry.simplicial import Mesh
-from eigenshape.geometry.topology import adjacency_matrix
 from eigenshape.operators.laplacian import Laplacian
 
 Kind = Literal["combinatorial", "weighted", "normalized"]

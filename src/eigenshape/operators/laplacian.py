@@ -13,9 +13,9 @@ from jaxtyping import Int
 from certeig.kit.arguments import require_type
 from certeig.kit.arrays import ReadOnly, record
 from certeig.kit.errors import InvalidParameterError
+from certeig.kit.matrices import as_symmetric, require_points
 from certeig.kit.text import html_repr
 from certeig.kit.typing import ArrayLike
-from certeig.matrices import as_symmetric, require_points
 
 
 @dataclass(frozen=True)

@@ -6,16 +6,11 @@ import scipy.sparse as sp
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import Integer
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import size_one
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import MeshLike, ShapeLike, as_mesh
-from eigenshape.geometry.requirements import require_different_simplices
-from eigenshape.geometry.simplices import (
-    degenerate_simplices,
-    in_length,
-    require_span,
-    require_volumes,
-    size_one,
-)
+from eigenshape.geometry.requirements import require_different_simplices, require_volumes
+from eigenshape.geometry.simplices import degenerate_simplices, in_length, require_span
 from eigenshape.geometry.topology import require_simplices_everywhere
 from eigenshape.operators import flip_loops
 from eigenshape.operators.clouds.cloud_triangles import cloud_cover

@@ -8,12 +8,13 @@ from certeig.kit.errors import InvalidParameterError
 from certeig.kit.threads import one_blas_thread
 from certeig.sparse.symmetric_factor import factor_matrix
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import size_one
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.face_turns import orient_consistently
 from eigenshape.geometry.facets import boundary_facets
 from eigenshape.geometry.measure import edge_lengths, mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.simplices import mean_side_length, size_one
+from eigenshape.geometry.simplices import mean_side_length
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import boundary_vertices, neighbor_links
 from eigenshape.operators.cotangent import cotangent_laplacian

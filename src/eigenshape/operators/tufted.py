@@ -5,7 +5,7 @@ from jaxtyping import Float, Int
 
 from certeig.kit.arrays import record
 from certeig.kit.errors import ConvergenceError
-from eigenshape.geometry.measure import unit_vectors
+from eigenshape._vectors import unit_vectors
 from eigenshape.operators import flip_loops
 
 # a pair of cotangents that sums to less below zero is cocircular, relative to the terms in it

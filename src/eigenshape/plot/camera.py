@@ -12,8 +12,9 @@ from certeig.kit.arrays import ReadOnly, real_numbers, record, whole_number
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike
+from eigenshape._vectors import area_vectors, triangle_areas
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.measure import area_vectors, scale_to_unit, triangle_areas
+from eigenshape.geometry.measure import scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table, face_pairs
 

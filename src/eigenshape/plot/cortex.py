@@ -14,7 +14,7 @@ from certeig.kit.typing import ArrayLike
 from eigenshape.features.parcellation import Parcellation, require_parcels
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.repairs.masks import hemisphere_of
+from eigenshape.io.hemispheres import hemisphere_of
 from eigenshape.plot.camera import FREE_BORDER, aim_camera
 from eigenshape.plot.fields import (
     NO_VALUE,

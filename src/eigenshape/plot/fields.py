@@ -15,9 +15,9 @@ from certeig.kit.arrays import finite_values, real_numbers, whole_numbers
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike
 from eigenshape._arrays import face_labels, vertex_values
+from eigenshape._errors import count_nouns
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_areas
-from eigenshape.geometry.repairs.repair_report import count_nouns
 from eigenshape.plot.camera import Camera, Up, View, choose_camera
 from eigenshape.plot.figure import Figure
 from eigenshape.plot.render import Drawing, draw, palette

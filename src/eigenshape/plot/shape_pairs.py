@@ -10,8 +10,9 @@ from matplotlib.ticker import MaxNLocator, NullFormatter
 
 from certeig.kit.arguments import require_type
 from certeig.kit.errors import InvalidParameterError
+from eigenshape._vectors import nearest_rotations
 from eigenshape.geometry.conversion import MeshLike, ShapeLike, as_mesh, as_shape
-from eigenshape.geometry.measure import nearest_rotations, scale_to_unit
+from eigenshape.geometry.measure import scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import dual_volumes
 from eigenshape.matching.shape_match import ShapeMatch

@@ -11,11 +11,11 @@ from certeig.kit.errors import InvalidParameterError
 from certeig.kit.text import html_repr
 from certeig.kit.typing import ArrayLike
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import size_one
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair_steps import faces_of_largest
-from eigenshape.geometry.simplices import size_one
 from eigenshape.geometry.topology import submesh
 from eigenshape.scans.frames import pixel_faces
 from eigenshape.scans.partial import rotation_towards, unit_direction

@@ -5,10 +5,9 @@ from jaxtyping import Float, Int
 from scipy.spatial import Delaunay
 
 from eigenshape._errors import InvalidShapeError
-from eigenshape.geometry.measure import area_vectors
+from eigenshape._vectors import area_vectors, size_one
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair_report import RepairedMesh
-from eigenshape.geometry.simplices import size_one
 from eigenshape.geometry.topology import submesh
 
 # Measured pixels are connected if their depths differ by at most this many times their distance in

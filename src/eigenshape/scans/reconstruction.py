@@ -10,11 +10,11 @@ from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import area_vectors, size_one, triangle_areas
 from eigenshape.geometry.cloud import PointCloud
-from eigenshape.geometry.measure import area_vectors, triangle_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair_report import RepairedMesh
-from eigenshape.geometry.simplices import cut_tetrahedra, size_one
+from eigenshape.geometry.simplices import cut_tetrahedra
 from eigenshape.geometry.topology import submesh, vertex_components
 
 FEWEST_POINTS = 100  # below, a grid as fine as the points has about ten cells a side

@@ -12,8 +12,9 @@ from scipy.sparse.linalg import splu
 from certeig.kit.arrays import record, whole_number
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.threads import one_blas_thread
+from eigenshape._arrays import adjacency_matrix
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.topology import adjacency_matrix, edge_table
+from eigenshape.geometry.topology import edge_table
 from eigenshape.shapes.creature_plans import CREATURES, PLANS
 from eigenshape.shapes.isosurface import find_spacing, isosurface, relax
 from eigenshape.shapes.limbs import distance_to_body, nearest_limbs, place_limbs

@@ -1,7 +1,6 @@
 """Spectra kept in a folder, each under a hash of its operator and of what was requested."""
 
 import hashlib
-import tempfile
 import warnings
 from dataclasses import astuple
 from importlib.metadata import version
@@ -10,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from certeig.archive import FORMAT
-from certeig.kit.errors import FileFormatError, InvalidParameterError
+from certeig.kit.errors import FileFormatError
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.spectrum import Spectrum
 
@@ -67,22 +66,6 @@ def keep(spectrum: Spectrum, folder: str | Path, key: str) -> None:
         warnings.warn(
             f"A spectrum was computed and could not be kept in the cache: {error}", stacklevel=3
         )
-
-
-def require_writable(cache: str | Path) -> None:
-    """Make a folder if there is none, and raise an error if files cannot be written to it.
-
-    Raises an InvalidParameterError with what the system says.
-    """
-    folder = Path(cache)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError as error:
-        raise InvalidParameterError(
-            f"cache must be a folder that can be written to; {folder}: {error}."
-        ) from error
 
 
 def _place(folder: str | Path, key: str) -> Path:

@@ -5,23 +5,23 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Int
 
 import certeig
 from certeig.kit.arguments import require_choice, require_type
-from certeig.kit.arrays import freeze, positive_number, whole_number
+from certeig.kit.arrays import as_interval, freeze, positive_number, whole_number
 from certeig.kit.errors import InvalidParameterError
-from certeig.kit.files import as_path
+from certeig.kit.files import as_path, require_writable
+from certeig.kit.matrices import on_all_rows
 from certeig.kit.progress import Progress, silent
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike, Integer
-from certeig.matrices import on_all_rows
 from certeig.solver.certified import certified_pairs
 from certeig.solver.certify import in_user_units
 from certeig.solver.eigenpairs import Pairs
 from certeig.solver.pencil import Pencil, to_user_vectors
 from eigenshape.operators.laplacian import Laplacian, dirichlet_laplacian
-from eigenshape.spectral.cache import content_key, keep, load_kept, require_writable
+from eigenshape.spectral.cache import content_key, keep, load_kept
 from eigenshape.spectral.kernel_values import (
     from_pencil,
     require_readable,
@@ -174,11 +174,14 @@ def solve_spectrum(  # noqa: PLR0913 - one keyword for each choice: which pairs,
     True
     """
     require_type(laplacian, Laplacian, "laplacian")
-    _require_fitting_options(method, k, above, below, accuracy, max_residual)
+    interval = as_interval(k, above, below, _end_of_interval)
+    _require_fitting_options(method, below, accuracy, max_residual)
     operator, free = laplacian, None
     if fixed is not None and np.size(fixed):
         operator, free = dirichlet_laplacian(laplacian, fixed)
-    wanted, interval = _requested_pairs(operator, k, above, below)
+    wanted = 0 if k is None else whole_number(k, "k", 1, operator.n_points)
+    if k is None:
+        interval = to_pencil(operator.kernel, interval)
     error = DEFAULT_ACCURACY if accuracy is None else float(accuracy)
     residual = np.inf if max_residual is None else float(max_residual)
     request: tuple[str | float, ...] = (wanted, *interval.tolist())
@@ -211,24 +214,19 @@ def solve_spectrum(  # noqa: PLR0913 - one keyword for each choice: which pairs,
     return _on_all_points(spectrum, laplacian, free)
 
 
+def _end_of_interval(value: float, name: str) -> float:
+    """Return an end of an interval of eigenvalues; from 0 on are all, also those that rounding makes negative."""
+    return -np.inf if name == "above" and value == 0 else positive_number(value, name)
+
+
 def _require_fitting_options(
     method: str,
-    k: Integer | None,
-    above: float | None,
     below: float | None,
     accuracy: float | None,
     max_residual: float | None,
 ) -> None:
     """Raise an error if options are given that do not go together."""
     require_choice(method, Method, "method")
-    if (k is None) == (below is None):
-        raise InvalidParameterError(
-            f"Exactly one of k and below must be given; k is {k} and below is {below}."
-        )
-    if below is None and above is not None:
-        raise InvalidParameterError(
-            f"above needs below, the other end of an interval; above is {above}."
-        )
     if method == "approximate" and below is not None:
         raise InvalidParameterError(
             f"method='approximate' needs k, because it cannot count the eigenvalues below a value; below is "
@@ -243,21 +241,6 @@ def _require_fitting_options(
                 f"eigenvalues to rounding. Leave out {name}, or pass method='approximate'."
             )
         require_accuracy(name, value, LEAST_ACCURACY)
-
-
-def _requested_pairs(
-    operator: Laplacian, k: Integer | None, above: float | None, below: float | None
-) -> tuple[int, Float[np.ndarray, " 2"]]:
-    """Return k, or 0 and the ends of an interval of the pencil's eigenvalues."""
-    if k is not None:
-        return whole_number(k, "k", 1, operator.n_points), np.zeros(2)
-    high = positive_number(np.array(below, dtype=float), "below")
-    low = -np.inf if above is None or above == 0 else positive_number(above, "above")
-    if low >= high:
-        raise InvalidParameterError(
-            f"above must be less than below; above is {above} and below is {below}."
-        )
-    return 0, to_pencil(operator.kernel, np.array([low, high]))
 
 
 def spectrum_of(

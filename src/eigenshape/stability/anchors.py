@@ -1,5 +1,7 @@
 """Anchor nodes spread over a shape, and the regions around them (thesis 4.2.1)."""
 
+from itertools import combinations
+
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.spatial import cKDTree
@@ -7,11 +9,10 @@ from scipy.spatial import cKDTree
 from certeig.kit.arguments import require_type
 from certeig.kit.arrays import ReadOnly, positive_values, record, whole_number
 from certeig.kit.errors import InvalidParameterError
+from eigenshape._vectors import size_one
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
-from eigenshape.geometry.distances.closest import squared_distances
-from eigenshape.geometry.distances.geodesic import farthest_first, unchecked_waves
+from eigenshape.geometry.distances.geodesic import unchecked_waves
 from eigenshape.geometry.samples.surface_points import SurfacePoints, place_points
-from eigenshape.geometry.simplices import size_one
 from eigenshape.operators.crouzeix_raviart import longest_edges
 from eigenshape.stability.perturbation import OUTSIDE, Perturbation
 
@@ -90,13 +91,13 @@ def anchor_nodes(mesh: MeshLike, delta: float, *, start: int = 0) -> AnchorNodes
     """
     mesh = as_simplicial(mesh)
     positive_values(delta, "delta")
-    least, chosen = np.full(mesh.n_points, np.inf), []
-    first = whole_number(start, "start", 0, mesh.n_points - 1)
-    for vertex, row in farthest_first(unchecked_waves(mesh), mesh.n_points, first):
-        if least[vertex] < delta:
-            break
+    wave, least, chosen = unchecked_waves(mesh), np.full(mesh.n_points, np.inf), []
+    vertex = whole_number(start, "start", 0, mesh.n_points - 1)
+    while least[vertex] >= delta:
         chosen.append(vertex)
-        np.minimum(least, row, out=least)
+        # The wave need not go farther than it comes nearest.
+        np.minimum(least, wave(np.array([vertex]), least.max()), out=least)
+        vertex = int(least.argmax())
     reached = float(least.max())
     return AnchorNodes(
         vertices=np.array(chosen),
@@ -254,3 +255,26 @@ def regions_met(perturbation: Perturbation, nodes: Points, reach: float) -> Bool
             least = squared_distances(point[None], near).min(initial=np.inf)
             found[node, region] = least <= within**2
     return found
+
+
+def squared_distances(
+    points: Float[np.ndarray, "p d"], corners: Float[np.ndarray, "s corners d"]
+) -> Float[np.ndarray, "p s"]:
+    """Return the squared distance of each point to each simplex, in length².
+
+    The nearest point of a simplex lies in the interior of one of its sides: the simplex itself, a
+    facet, and so on down to a corner. There it is the foot of the perpendicular to the flat of that
+    side. So the least distance over all sides that contain their foot is returned.
+    """
+    least = np.full((len(points), len(corners)), np.inf)
+    numbers = range(corners.shape[1])
+    for size in range(1, corners.shape[1] + 1):
+        for side in combinations(numbers, size):
+            origin, others = corners[:, side[0]], corners[:, side[1:]]
+            sides, ways = others - origin[:, None], points[:, None] - origin
+            weights = np.einsum("sda,psd->psa", np.linalg.pinv(sides), ways)
+            inside = (weights >= 0).all(axis=2) & (weights.sum(axis=2) <= 1)
+            left = ways - np.einsum("psa,sad->psd", weights, sides)
+            squares = np.where(inside, np.einsum("psd,psd->ps", left, left), np.inf)
+            np.minimum(least, squares, out=least)
+    return least

@@ -8,8 +8,10 @@ from jaxtyping import Float
 
 from certeig.kit.arguments import require_type
 from certeig.kit.arrays import ReadOnly, record
+from eigenshape._vectors import size_one
 from eigenshape.geometry.enclosing_ball import enclosing_ball
-from eigenshape.geometry.simplices import require_volumes, size_one, volumes
+from eigenshape.geometry.requirements import require_volumes
+from eigenshape.geometry.simplices import volumes
 from eigenshape.stability.perturbation import Perturbation, vertex_pairs
 
 Limit = Literal["nothing", "displacement", "Jacobian", "ball", "volume"]

@@ -10,8 +10,8 @@ from certeig.kit.arrays import ReadOnly, positive_values, record
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike
 from eigenshape._arrays import finite_rows
+from eigenshape._vectors import size_one
 from eigenshape.geometry.samples.surface_points import SurfacePoints
-from eigenshape.geometry.simplices import size_one
 from eigenshape.stability.anchors import preimages, regions_met
 from eigenshape.stability.bipartite_loops import match_rows
 from eigenshape.stability.least_matching import least_perfect, near_pairs

@@ -11,9 +11,9 @@ from certeig.kit.progress import Progress, silent
 from certeig.kit.typing import ArrayLike
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.conversion import ShapeLike, as_shape
+from eigenshape.geometry.samples.spacing import neighbor_distance
 from eigenshape.geometry.samples.surface_points import sample_surface
 from eigenshape.operators.catalog import build_laplacian
-from eigenshape.operators.clouds.kernel import neighbor_distance
 from eigenshape.spectral.bounds.brackets import bracket_eigenvalues
 from eigenshape.spectral.comparison.angles import EigenspaceAngles, eigenspace_angles
 from eigenshape.spectral.comparison.eigenvalues import SpectrumComparison, compare_spectra

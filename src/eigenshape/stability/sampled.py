@@ -11,12 +11,12 @@ from certeig.kit.progress import Progress
 from certeig.kit.text import html_repr
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.samples.quadrature import Quadrature
+from eigenshape.geometry.samples.spacing import neighbor_distance
 from eigenshape.geometry.samples.surface_points import sample_surface
 from eigenshape.operators.clouds.kernel import (
     KernelOptions,
     choose_kernel,
     kernel_laplacian,
-    neighbor_distance,
     require_whole,
 )
 from eigenshape.operators.clouds.neighbors import neighbor_graph

@@ -9,9 +9,9 @@ from torch import Tensor
 from certeig.kit.arguments import describe_value
 from certeig.kit.errors import InvalidParameterError
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import size_one
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_sound
-from eigenshape.geometry.simplices import size_one
 
 
 def as_tensor(array: Any) -> Tensor:

@@ -287,7 +287,8 @@ export class Studio implements App {
       this.open(panel.id);
       this.showSheet(true);
     };
-    const title = `${panel.title} (${number})`;
+    const key = `Shift+${number}`;
+    const title = `${panel.title} (${key})`;
     const control = { id: tabId, "data-test": tabId, role: "tab", "aria-controls": pageId };
     const tab = h("button", { ...control, type: "button", title, click }, panel.title);
     const region = { id: pageId, "data-test": pageId, role: "tabpanel", "aria-labelledby": tabId };
@@ -295,7 +296,7 @@ export class Studio implements App {
     this.page.get("tabs").append(tab);
     this.page.get("panels").append(page);
     this.pages.set(panel.id, { panel, tab, page });
-    this.shortcut(String(number), `Panel: ${panel.title}`, click);
+    this.shortcut(key, `Panel: ${panel.title}`, click);
   }
 
   private requestMesh(): Promise<[Float32Array, Uint32Array]> {
@@ -422,10 +423,12 @@ export class Studio implements App {
     const typing = target.matches?.("select, input:not([type=range], [type=checkbox])");
     if (typing || this.main.querySelector("dialog[open]")) return;
     if (["BUTTON", "SUMMARY"].includes(target.tagName) && event.key === "Enter") return; // it presses the button
-    const letter = event.key.length === 1 ? event.key.toUpperCase() : event.key;
+    // The digits are the keys, whatever Shift makes of them on this keyboard.
+    const digit = /^Digit(\d)$/.exec(event.code)?.[1];
+    const letter = digit ?? (event.key.length === 1 ? event.key.toUpperCase() : event.key);
     const control = event.ctrlKey || event.metaKey;
     // Shift is part of "?" itself, but tells "Ctrl+Shift+Z" from "Ctrl+Z".
-    const shift = event.shiftKey && /^[A-Z]/.test(letter);
+    const shift = event.shiftKey && /^[A-Z]|^\d$/.test(letter);
     const key = `${control ? "Ctrl+" : ""}${shift ? "Shift+" : ""}${letter}`;
     const found = this.shortcuts.get(key);
     const slides = target.matches?.("input[type=range]") && letter.startsWith("Arrow");

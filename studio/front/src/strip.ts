@@ -2,10 +2,27 @@
 
 import { Vector3 } from "three";
 import type { App } from "./contract";
+import { nearestAxis } from "./core/axes";
 import { download, Form, h } from "./core/dom";
 import { playFilm, saveGif, turntable, type Film } from "./core/film";
 import { Ruler } from "./core/ruler";
 import markup from "./strip.html?raw";
+
+// Keys, the buttons that they press, and what these do; the views have the keys that Blender gives them.
+const KEYS: [string, string, string?][] = [
+  ["E", "edges"],
+  ["X", "cut"],
+  ["M", "measure"],
+  ["F", "film"],
+  ["I", "texture"],
+  ["1", "view-front", "the front, orthographic"],
+  ["3", "view-right", "the right side, orthographic"],
+  ["7", "view-top", "from above, orthographic"],
+  ["9", "view-opposite", "the opposite side, orthographic"],
+  ["5", "parallel", "orthographic or in perspective"],
+];
+
+const TILT = 1e-4; // by which a view from above leans to the front, which is then below
 
 export class Strip {
   private readonly form = new Form(markup);
@@ -19,6 +36,12 @@ export class Strip {
     this.ruler = new Ruler(viewer);
     form.on({
       whole: () => viewer.fit(),
+      views: () => (form.get("views-menu").hidden = !this.toggle("views")),
+      "view-front": () => this.lookFrom(2),
+      "view-right": () => this.lookFrom(0),
+      "view-top": () => this.lookFrom(1),
+      "view-opposite": () => this.look(viewer.axes.towards.negate()),
+      parallel: () => this.showParallel(!viewer.parallel),
       edges: () => {
         viewer.edges.show(this.toggle("edges"));
         viewer.invalidate();
@@ -46,10 +69,10 @@ export class Strip {
         app.refreshPanels(); // the hint says what a finger does
       },
     });
-    const keys = { E: "edges", X: "cut", M: "measure", F: "film", I: "texture" };
-    for (const [key, name] of Object.entries(keys))
-      app.shortcut(key, `Picture: ${name}`, () => form.get(name).click());
+    for (const [key, name, text] of KEYS)
+      app.shortcut(key, `Picture: ${text ?? name}`, () => form.get(name).click());
     form.get("film-page").hidden = !app.state.capabilities.includes("finish");
+    form.get("parallel").ariaPressed = String(viewer.parallel); // the view of a page that is loaded again
     this.showFinger();
     this.refresh();
     viewer.stage.append(form.root);
@@ -72,13 +95,34 @@ export class Strip {
     return on;
   }
 
+  /** Return the axes of the coordinates that point to the right, up, and to the front. */
+  private get axes(): [Vector3, Vector3, Vector3] {
+    const { up, towards } = this.app.state;
+    const above = nearestAxis(new Vector3(...up));
+    const front = nearestAxis(new Vector3(...towards).projectOnPlane(above));
+    return [above.clone().cross(front), above, front];
+  }
+
+  private lookFrom(axis: 0 | 1 | 2): void {
+    this.look(this.axes[axis]);
+  }
+
+  /** Show the shape from a side, as in a drawing. */
+  private look(side: Vector3): void {
+    const [, , front] = this.axes;
+    this.showParallel(true);
+    this.app.viewer.fit(nearestAxis(side).addScaledVector(front, TILT).toArray());
+  }
+
+  private showParallel(parallel: boolean): void {
+    this.app.viewer.parallel = parallel;
+    this.form.get("parallel").ariaPressed = String(parallel);
+  }
+
   private cut(): void {
     const { form, app } = this;
-    const { up, towards } = app.state;
-    const [above, front] = [new Vector3(...up), new Vector3(...towards)];
-    const right = above.clone().cross(front).normalize();
-    const along = [right.clone().cross(above), right, above];
-    const direction = along[form.get<HTMLSelectElement>("cut-along").selectedIndex]!;
+    const [right, above, front] = this.axes;
+    const direction = [front, right, above][form.get<HTMLSelectElement>("cut-along").selectedIndex]!;
     const on = form.get("cut").ariaPressed === "true";
     app.viewer.cut(on ? direction : null, form.number("cut-place"));
   }

@@ -3,12 +3,7 @@ import pytest
 
 from certeig.kit.errors import InvalidParameterError
 from eigenshape._errors import InvalidShapeError
-from eigenshape.geometry.distances.closest import (
-    closest_points,
-    signed_distance,
-    squared_distances,
-    winding_numbers,
-)
+from eigenshape.geometry.distances.closest import closest_points, signed_distance, winding_numbers
 from eigenshape.geometry.facets import boundary_surface
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.orientation import orient_outward
@@ -16,6 +11,7 @@ from eigenshape.geometry.repairs.repair import repair
 from eigenshape.geometry.topology import disjoint_union
 from eigenshape.shapes.domains import box
 from eigenshape.shapes.surfaces import grid, icosphere, torus
+from eigenshape.stability.anchors import squared_distances
 
 CUBE = boundary_surface(box(2, 2, 2))
 BALL = icosphere(2)

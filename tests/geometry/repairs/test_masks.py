@@ -1,17 +1,12 @@
 """Parts of a surface that a mask keeps, and values put back."""
 
-from importlib import resources
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 import eigenshape as es
 from eigenshape import InvalidParameterError
 from eigenshape.geometry import mask_surface, unmask
-from eigenshape.geometry.repairs.masks import hemisphere_of
 
-CORTICES = Path(str(resources.files("neuromodes") / "data"))
 GRID = es.shapes.grid(4, 2)  # 5 by 3 vertices
 
 
@@ -75,11 +70,3 @@ def test_bad_values_on_a_part_are_named():
         unmask([1.0], [4], 4)
     with pytest.raises(es.InvalidParameterError, match="must fit into memory; n_vertices is 1000"):
         unmask([1.0], [0], 10**15)
-
-
-def test_the_side_of_a_cortex_is_found():
-    paths = sorted(CORTICES.glob("*midthickness.surf.gii"))
-    assert len(paths) == 8
-    for path in paths:
-        assert hemisphere_of(es.read_mesh(path)) == ("left" if "hemi-L" in path.name else "right")
-    assert hemisphere_of(es.icosphere(2)) == ""

@@ -5,10 +5,10 @@ from certeig.kit.errors import InvalidParameterError
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.samples.quadrature import shape_quadrature
+from eigenshape.geometry.samples.spacing import neighbor_distance
 from eigenshape.operators.clouds import cloud_kernel
 from eigenshape.operators.clouds.cloud_kernel import cloud_width, point_cloud_laplacian
 from eigenshape.operators.clouds.gaussian import gaussian_laplacian
-from eigenshape.operators.clouds.kernel import neighbor_distance
 from eigenshape.shapes.exact import sphere_eigenvalues
 from eigenshape.shapes.spheres import (
     fibonacci_sphere,

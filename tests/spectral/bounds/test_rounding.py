@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.linalg as sl
 
-from certeig.sparse.symmetric_factor import EPS
+from certeig.kit.arrays import EPS
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.operators.cotangent import cotangent_laplacian

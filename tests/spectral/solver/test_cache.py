@@ -9,6 +9,7 @@ import pytest
 
 import eigenshape
 from certeig import archive
+from certeig.kit import files
 from certeig.kit.errors import InvalidParameterError
 from eigenshape.operators.clouds.gaussian import mesh_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
@@ -147,7 +148,7 @@ def test_a_folder_that_cannot_be_written_to_is_refused_before_anything_is_comput
     def forbid(**_):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(cache.tempfile, "TemporaryFile", forbid)
+    monkeypatch.setattr(files.tempfile, "TemporaryFile", forbid)
     with pytest.raises(InvalidParameterError, match=r"cache must be .* Permission denied"):
         solve_spectrum(laplacian, 5, cache=tmp_path)
 

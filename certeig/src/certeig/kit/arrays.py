@@ -1,7 +1,7 @@
 """Checks of arrays and numbers, with errors that name the argument, and read-only copies."""
 
 import operator
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from copy import deepcopy
 from dataclasses import dataclass
 from typing import Any, TypeVar, dataclass_transform
@@ -15,6 +15,7 @@ from certeig.kit.memory import require_memory
 from certeig.kit.text import Shown
 from certeig.kit.typing import ArrayLike, Integer
 
+EPS = float(np.finfo(np.float64).eps)  # rounding of a number near 1, relative
 # Share of the memory of the machine that one array may take while it is checked and copied. A
 # larger share would leave too little for the computation.
 SHARE_OF_ARRAYS = 0.5
@@ -124,6 +125,35 @@ def finite_number(value: ArrayLike, name: str) -> float:
 def positive_number(value: ArrayLike, name: str) -> float:
     """Return `value` as a positive and finite float, given as a number or a list of one."""
     return _one(positive_values(value, name), name)
+
+
+def as_interval(
+    k: Integer | None,
+    above: float | None,
+    below: float | None,
+    as_end: Callable[[float, str], float],
+) -> NDArray[np.float64]:
+    """Return the interval of the eigenvalues that are requested, or zeros if the lowest k are.
+
+    `as_end` checks an end by its name.
+    """
+    if (k is None) == (below is None):
+        raise InvalidParameterError(
+            f"Exactly one of k and below must be given; k is {k} and below is {below}."
+        )
+    if below is None:
+        if above is not None:
+            raise InvalidParameterError(
+                f"above needs below, the other end of an interval; above is {above}."
+            )
+        return np.zeros(2)
+    high = as_end(below, "below")
+    low = -np.inf if above is None else as_end(above, "above")
+    if low >= high:
+        raise InvalidParameterError(
+            f"above must be less than below; above is {above} and below is {below}."
+        )
+    return np.array([low, high])
 
 
 def number_from_zero(value: ArrayLike, name: str) -> float:

@@ -5,6 +5,7 @@ import re
 import secrets
 import shutil
 import stat
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from hashlib import file_digest
@@ -32,6 +33,22 @@ def as_path(value: object, name: str = "path") -> Path:
             f"{name} must not hold the character NUL; {text!r} does, at place {text.index(chr(0))}."
         )
     return Path(text)
+
+
+def require_writable(cache: str | Path) -> None:
+    """Make a folder if there is none, and raise an error if files cannot be written to it.
+
+    Raises an InvalidParameterError with what the system says.
+    """
+    folder = Path(cache)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise InvalidParameterError(
+            f"cache must be a folder that can be written to; {folder}: {error}."
+        ) from error
 
 
 def require_lines(data: bytes) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import scipy.linalg as sl
 from jaxtyping import Float, Int
 
-from certeig.kit.arrays import record
+from certeig.kit.arrays import EPS, record
 from certeig.kit.errors import ConvergenceError
 from certeig.solver.chebyshev import ChebyshevFilter
 from certeig.solver.factor import Factor
@@ -30,7 +30,7 @@ from certeig.sparse.symmetric_factor import Scratch
 # Residual of a converged pair, relative to the shift.
 TOLERANCE = 5e-12
 # Residual that rounding leaves, relative to the largest θ.
-FLOOR = 32 * float(np.finfo(np.float64).eps)
+FLOOR = 32 * EPS
 # A column that projection shortens below this share of its length is projected once more.
 SHRUNK = 1e-2
 # Projections of a block at most.

@@ -6,7 +6,7 @@ import scipy.sparse as sp
 from jaxtyping import Float
 
 from certeig.kit.errors import InvalidParameterError
-from certeig.matrices import find_zero_row_sums
+from certeig.kit.matrices import find_zero_row_sums
 from certeig.solver.factor import factorize
 from certeig.solver.inertia import bound_count
 from certeig.solver.pencil import Pencil, normalize

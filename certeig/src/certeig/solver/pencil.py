@@ -9,14 +9,13 @@ from jaxtyping import Float, Int
 from scipy.sparse.csgraph import connected_components
 
 from certeig.advice import Advice
-from certeig.kit.arrays import record
+from certeig.kit.arrays import EPS, record
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.threads import map_in_threads
 from certeig.solver.residual_loops import add_sums
 from certeig.sparse.elimination import Elimination, analyze_pattern
 from certeig.sparse.symmetric_factor import FactorMemory, factor_memory, factorize_symmetric
 
-EPS = float(np.finfo(np.float64).eps)
 # Columns that are processed together: enough for fast products, with little memory.
 COLUMNS_AT_ONCE = 64
 # Largest ratio of two diagonal entries: squares of vectors must not overflow.

@@ -4,7 +4,7 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from certeig.kit.arrays import record
+from certeig.kit.arrays import EPS, record
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.threads import (
     SpareMemory,
@@ -17,8 +17,6 @@ from certeig.sparse import front_loops as fronts
 from certeig.sparse.basis_loops import LANES
 from certeig.sparse.blas import blas_routines
 from certeig.sparse.elimination import Elimination, analyze_pattern
-
-EPS = float(np.finfo(np.float64).eps)
 
 Indices = Int[np.ndarray, " ..."]
 # Two fronts, and a number for each row.

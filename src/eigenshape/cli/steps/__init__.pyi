@@ -8,8 +8,6 @@ from .condensing import join_tables as join_tables
 from .condensing import require_table as require_table
 from .condensing import run_in_workers as run_in_workers
 from .condensing import write_table as write_table
-from .facts import note_seams as note_seams
-from .facts import shape_facts as shape_facts
 from .indexing import choose_shapes as choose_shapes
 from .indexing import describe_all as describe_all
 from .indexing import learn_codebook as learn_codebook
@@ -29,9 +27,11 @@ from .reading import load_poses as load_poses
 from .reading import load_repaired as load_repaired
 from .reading import load_shape as load_shape
 from .reading import load_surface as load_surface
+from .reading import note_seams as note_seams
 from .reading import read_examples as read_examples
 from .reading import read_map as read_map
 from .reading import repair_worn as repair_worn
+from .reading import shape_facts as shape_facts
 from .recipes import index_recipe as index_recipe
 from .recipes import query_recipe as query_recipe
 from .sheets import CAPTION as CAPTION

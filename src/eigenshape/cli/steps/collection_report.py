@@ -13,12 +13,12 @@ from jaxtyping import Float
 from matplotlib.image import imsave
 
 from certeig.kit.files import replace_file
+from eigenshape._vectors import mean_radius
 from eigenshape.cli.steps.collecting import unsure_sides
 from eigenshape.collections.alignment import best_similarity
 from eigenshape.collections.carrying import CarriedLandmarks
 from eigenshape.collections.collection import Collection, unreflect
 from eigenshape.geometry.distances.closest import closest_points
-from eigenshape.geometry.measure import mean_radius
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.samples.surface_points import place_points
 from eigenshape.morphometrics.procrustes import fit_procrustes

@@ -12,11 +12,13 @@ from certeig.kit.errors import CerteigError, InvalidParameterError
 from eigenshape.cli.console import err, escape_text, print_repairs
 from eigenshape.cli.inputs import repair_names
 from eigenshape.deformation.distortion import require_poses
-from eigenshape.geometry.cloud import Shape
+from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair import repair
 from eigenshape.geometry.repairs.repair_names import drops_missing
 from eigenshape.geometry.repairs.repair_report import RepairedCloud, RepairedMesh
+from eigenshape.geometry.repairs.shape_facts import shape_facts
+from eigenshape.geometry.seams import seams
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.io import shape_files
 from eigenshape.io.attributes import MeshAttributes
@@ -31,7 +33,7 @@ from eigenshape.io.mesh_files import read_mesh
 from eigenshape.io.surface_files import read_surface
 from eigenshape.retrieval.labels.labeled_shape import LabeledShape
 
-__all__ = ["read_map"]  # for the verbs, as it is, beside what is defined here
+__all__ = ["read_map", "shape_facts"]  # for the verbs, as they are, beside what is defined here
 
 
 def load_surface(path: Path, repairs: str) -> TriangleMesh:
@@ -62,6 +64,16 @@ def load_shape(
     done = shape_files.load_shape(path, repair_names(repairs), dim=dim, cells=cells, scene=scene)
     print_repairs(done.report)
     return done.cloud if isinstance(done, RepairedCloud) else done.mesh
+
+
+def note_seams(shape: Shape) -> None:
+    """Print on stderr that a mesh is open along seams."""
+    n_seams = 0 if isinstance(shape, PointCloud) else len(seams(shape))
+    if n_seams:
+        err.print(
+            f"[yellow]note:[/] this shape is open along seams ({n_seams} sides), which no heat "
+            "crosses; --repair weld_seams closes them"
+        )
 
 
 def load_repaired(

@@ -10,12 +10,12 @@ from certeig.kit.arrays import record
 from certeig.kit.errors import CerteigError
 from certeig.kit.text import literal
 from eigenshape._errors import StoreError
+from eigenshape._vectors import nearest_rotations, size_one
 from eigenshape.cli.console import err, escape_text, progress_bar
 from eigenshape.cli.steps.writing import Side
 from eigenshape.geometry.distances.geodesic import geodesic_distances
-from eigenshape.geometry.measure import nearest_rotations, surface_area
+from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.simplices import size_one
 from eigenshape.io.surface_files import read_surface
 from eigenshape.plot.camera import aim_camera
 from eigenshape.plot.sheet import Panel, figure_contact_sheet
@@ -24,7 +24,10 @@ from eigenshape.retrieval.heat.recipe import HeatRecipe
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, describe
 from eigenshape.retrieval.search.matches import Match
 
-CAPTION = "corresponding parts have one color; a lower score is more similar"
+CAPTION = (
+    "equal colors: corresponding parts; gray: no correspondence; red points: points that correspond\n"
+    "lower score: more similar; turned: drawn from the same side as the query"
+)
 N_CELLS = 12  # of the query by patches
 FEWEST_TO_TURN = 4  # pairs of points that determine how a match is turned
 N_EXPLAINED = 12  # pairs of points of an explanation: as many colors as people tell apart
@@ -114,20 +117,18 @@ def explanation(
     """
     mesh = _read_match(match, repairs)
     ours, theirs = match.correspondences[:N_EXPLAINED].T
-    panels = []
-    for surface, name, vertices in (
-        (query.mesh, f"query: {title}", query.descriptor.vertices[ours]),
-        (mesh, f"{literal(match.name)}\nscore {match.score:.3f}", match.vertices[theirs]),
-    ):
+    vertices = query.descriptor.vertices[ours], match.vertices[theirs]
+    labels = []
+    for surface, places in zip((query.mesh, mesh), vertices, strict=True):
         reach = REACH * np.sqrt(surface_area(surface) / max(len(match.vertices), 1))
-        labels = _cells(surface, vertices, np.arange(len(vertices)), reach)
-        shown = surface if surface is query.mesh else _turned(surface, query, match)
-        panels.append(Panel(shown, name, labels, vertices))
+        labels.append(_cells(surface, places, np.arange(len(places)), reach))
+    first = Panel(query.mesh, f"query: {title}", labels[0], vertices[0])
+    second = _match_panel(query, match, mesh, labels[1], vertices[1])
     caption = (
         f"The {len(ours)} surest of {len(match.correspondences)} pairs of corresponding points: "
         "their surroundings have one color"
     )
-    return figure_contact_sheet(panels[0], panels[1:], caption=caption, **_side_of(query, side))
+    return figure_contact_sheet(first, [second], caption=caption, **_side_of(query, side))
 
 
 def _side_of(query: ColoredQuery, side: Side) -> Side:
@@ -136,26 +137,33 @@ def _side_of(query: ColoredQuery, side: Side) -> Side:
     return {"view": towards, "up": -down}
 
 
-def _turned(mesh: TriangleMesh, query: ColoredQuery, match: Match) -> TriangleMesh:
-    """Turn a match so that points which correspond lie on the same side as on the query."""
+def _match_panel(
+    query: ColoredQuery,
+    match: Match,
+    mesh: TriangleMesh,
+    labels: Int[np.ndarray, " f"],
+    vertices: Int[np.ndarray, " p"],
+) -> Panel:
+    """Return a match with its score, turned to the side of the query if enough points correspond."""
+    title = f"{literal(match.name)}\nscore {match.score:.3f}"
     ours, theirs = match.correspondences.T
-    if len(ours) < FEWEST_TO_TURN:
-        return mesh
-    targets = query.mesh.vertices[query.descriptor.vertices[ours]]
-    points = mesh.vertices[match.vertices[theirs]]
-    targets, points = (size_one(each - each.mean(axis=0))[0] for each in (targets, points))
-    rotation = nearest_rotations((targets.T @ points)[None])[0]
-    return TriangleMesh(mesh.vertices @ rotation.T, mesh.faces)
+    if len(ours) >= FEWEST_TO_TURN:
+        targets = query.mesh.vertices[query.descriptor.vertices[ours]]
+        points = mesh.vertices[match.vertices[theirs]]
+        targets, points = (size_one(each - each.mean(axis=0))[0] for each in (targets, points))
+        rotation = nearest_rotations((targets.T @ points)[None])[0]
+        mesh = TriangleMesh(mesh.vertices @ rotation.T, mesh.faces)
+        title += ", turned"
+    return Panel(mesh, title, labels, vertices)
 
 
 def _panel(query: ColoredQuery, match: Match, repairs: tuple[str, ...]) -> Panel:
-    title = f"{literal(match.name)}\nscore {match.score:.3f}"
     try:
         mesh = _read_match(match, repairs)
     except (CerteigError, OSError) as error:
         err.print(f"[yellow]not drawn:[/] {escape_text(match.name)}: {escape_text(error)}")
         nothing = np.zeros(0, dtype=np.int64)
-        return Panel(None, title, nothing, nothing)
+        return Panel(None, f"{literal(match.name)}\nscore {match.score:.3f}", nothing, nothing)
     ours, theirs = match.correspondences.T
     recipe = query.descriptor.recipe
     if isinstance(recipe, HeatRecipe):
@@ -175,7 +183,7 @@ def _panel(query: ColoredQuery, match: Match, repairs: tuple[str, ...]) -> Panel
         reach = REACH * np.sqrt(surface_area(mesh) / len(match.vertices))
         labels = _cells(mesh, match.vertices[theirs], query.colors[ours], reach)
     marked = theirs[np.isin(ours, query.dots)]
-    return Panel(_turned(mesh, query, match), title, labels, match.vertices[marked])
+    return _match_panel(query, match, mesh, labels, match.vertices[marked])
 
 
 def _read_match(match: Match, repairs: tuple[str, ...]) -> TriangleMesh:

@@ -18,11 +18,10 @@ from eigenshape.io.carrying import carry_attributes
 from eigenshape.io.formats.registry import (
     HEMISPHERES,
     SHAPE_FORMATS,
-    UPRIGHT,
     WITH_COLORS,
     WITH_MORE,
     WRITTEN,
-    suffix_in,
+    is_upright,
     suffix_of,
 )
 from eigenshape.io.labeled_shapes import write_labels
@@ -52,7 +51,7 @@ def picture_side(view: str, up: str, *pictures: Path | None, shapes: Sequence[Pa
     for path in pictures:
         if path is not None:
             require_picture_path(path)
-    if up == "auto" and shapes and all(suffix_in(path.name) in UPRIGHT for path in shapes):
+    if up == "auto" and shapes and all(map(is_upright, shapes)):
         up = "y"
     return {
         "view": _name_or_direction(view, "--view", ("auto", *VIEWS)),

@@ -1,7 +1,5 @@
 """Nearest points on a surface, winding numbers around points, and distances in space."""
 
-from itertools import combinations
-
 import numpy as np
 from jaxtyping import Float
 
@@ -9,6 +7,7 @@ from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike
 from eigenshape._arrays import finite_rows
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import size_one
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.distances.closest_loops import nearest_faces, windings
 from eigenshape.geometry.distances.crossing_loops import box_tree, curve_places, face_boxes
@@ -18,7 +17,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.orientation import orient_outward
 from eigenshape.geometry.requirements import require_oriented
 from eigenshape.geometry.samples.surface_points import SurfacePoints, place_points
-from eigenshape.geometry.simplices import in_length, size_one
+from eigenshape.geometry.simplices import in_length
 from eigenshape.geometry.topology import is_closed
 
 # Points may be this many sizes of the mesh away: products of three distances stay below 1e200, and
@@ -173,29 +172,6 @@ def signed_distance(mesh: MeshLike, points: ArrayLike) -> Float[np.ndarray, " p"
     inside = np.flatnonzero(boxed)[windings(places[boxed], corners) > INSIDE]
     distances[inside] *= -1
     return in_length(distances, scale, 1)
-
-
-def squared_distances(
-    points: Float[np.ndarray, "p d"], corners: Float[np.ndarray, "s corners d"]
-) -> Float[np.ndarray, "p s"]:
-    """Return the squared distance of each point to each simplex, in length².
-
-    The nearest point of a simplex lies in the interior of one of its sides: the simplex itself, a
-    facet, and so on down to a corner. There it is the foot of the perpendicular to the flat of that
-    side. So the least distance over all sides that contain their foot is returned.
-    """
-    least = np.full((len(points), len(corners)), np.inf)
-    numbers = range(corners.shape[1])
-    for size in range(1, corners.shape[1] + 1):
-        for side in combinations(numbers, size):
-            origin, others = corners[:, side[0]], corners[:, side[1:]]
-            sides, ways = others - origin[:, None], points[:, None] - origin
-            weights = np.einsum("sda,psd->psa", np.linalg.pinv(sides), ways)
-            inside = (weights >= 0).all(axis=2) & (weights.sum(axis=2) <= 1)
-            left = ways - np.einsum("psa,sad->psd", weights, sides)
-            squares = np.where(inside, np.einsum("psd,psd->ps", left, left), np.inf)
-            np.minimum(least, squares, out=least)
-    return least
 
 
 def _scale_both(

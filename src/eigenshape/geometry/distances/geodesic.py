@@ -1,20 +1,21 @@
 """Geodesic distances on surfaces, their averages, and farthest points."""
 
-from collections.abc import Callable, Iterator
-from itertools import chain, islice
+from collections.abc import Callable
+from itertools import chain
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Float, Int
+from jaxtyping import Float, Int, Int32
 
 from certeig.kit.arrays import number_from_zero, positive_values, whole_number, whole_numbers
 from certeig.kit.threads import SpareMemory, map_in_threads, one_blas_thread
 from certeig.kit.typing import ArrayLike, Integer
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
-from eigenshape.geometry.distances.geodesic_loops import spread_wave, spread_waves
+from eigenshape.geometry.distances.geodesic_loops import choose_farthest, fill_rows, spread_waves
 from eigenshape.geometry.requirements import require_describable
+from eigenshape.geometry.samples.surface_points import SurfacePoints, require_on
 from eigenshape.geometry.simplices import dual_volumes, in_length, scaled_corners
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.geometry.topology import vertex_components
@@ -22,17 +23,18 @@ from eigenshape.geometry.topology import vertex_components
 # Sources of one task of the thread pool: enough that starting a task costs nothing beside it, few
 # enough that all cores have work.
 SOURCES_PER_TASK = 256
+# Waves over all vertices of one task: each takes a millisecond for 5,000 vertices.
+ROWS_PER_TASK = 8
 # Waves over all vertices for which a task has room at a time.
 WAVES_OF_ROOM = 2
 
 # Base points of the sum over the surface: about as many as Hilaga and others (2001) take. Time and
 # memory grow with this number.
 N_BASES = 150
-# Where the triangles at each vertex start, their other two corners, and seven lengths of each.
-Fans = tuple[
-    Int[np.ndarray, " n1"], Int[np.ndarray, " k"], Int[np.ndarray, " k"], Float[np.ndarray, "k 7"]
-]
+# Where the triangles at each vertex start, their other two corners, and three lengths of each.
+Fans = tuple[Int[np.ndarray, " n1"], Int32[np.ndarray, "k 2"], Float[np.ndarray, "k 3"]]
 Wave = Callable[..., Float[np.ndarray, " n"]]
+Rows = Callable[..., Float[np.ndarray, "k n"]]
 
 
 def geodesic_balls(mesh: MeshLike, radius: float) -> sp.csr_array:
@@ -83,7 +85,7 @@ def geodesic_balls(mesh: MeshLike, radius: float) -> sp.csr_array:
 
     def waves_from(first: int) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
         sources = np.arange(first, min(first + SOURCES_PER_TASK, n))
-        scratch, counts = _scratch(fans, 1), np.empty(len(sources), dtype=np.int64)
+        scratch, counts = _scratch(n), np.empty(len(sources), dtype=np.int64)
         # Room for the longest wave, and for many short ones in each call.
         reached, distances = (
             np.empty(WAVES_OF_ROOM * n, dtype=np.int64),
@@ -108,9 +110,9 @@ def geodesic_balls(mesh: MeshLike, radius: float) -> sp.csr_array:
 
 
 def geodesic_distances(
-    mesh: MeshLike, sources: ArrayLike, *, reach: float = np.inf
+    mesh: MeshLike, sources: ArrayLike | SurfacePoints, *, reach: float = np.inf
 ) -> Float[np.ndarray, "k n"]:
-    """Compute the geodesic distances from some vertices, or sets of vertices, to all vertices.
+    """Compute the geodesic distances from some vertices, sets of vertices, or points, to all vertices.
 
     The method is that of `geodesic_balls`, in the direction from the sources only. From a set of
     vertices one wave starts at all of them at once; an edge between two of them is a source along
@@ -120,8 +122,9 @@ def geodesic_distances(
     ----------
     mesh : MeshLike
         A surface, in any R^d.
-    sources : (k,) int, or k lists of int
-        Vertices. The distance from a list of vertices is that to the nearest of them.
+    sources : (k,) int, k lists of int, or SurfacePoints
+        Vertices, or points inside faces. The distance from a list of vertices is that to the nearest
+        of them.
     reach : float
         Largest distance that is needed, in length. A smaller reach takes less time.
 
@@ -136,7 +139,7 @@ def geodesic_distances(
     InvalidShapeError
         If the mesh does not have dimension 2.
     InvalidParameterError
-        If a source is not a vertex, or the reach is negative or no number.
+        If a source is not a vertex or a point of this mesh, or the reach is negative or no number.
 
     See Also
     --------
@@ -153,11 +156,48 @@ def geodesic_distances(
     [[0.0, 1.0, 2.0, 1.0, 1.4142, 2.2361, 2.0, 2.2361, 2.8284]]
     >>> es.geometry.geodesic_distances(grid, [[0, 1, 2]]).round(6).tolist()
     [[0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0]]
+
+    From a point inside a face:
+
+    >>> place = es.geometry.closest_points(grid, [[0.5, 0.25, 0]])
+    >>> es.geometry.geodesic_distances(grid, place).round(4)[0, :3].tolist()
+    [0.559, 0.9014, 1.82]
     """
     mesh = as_simplicial(mesh)
-    wave, radius = unchecked_waves(mesh), number_from_zero(reach, "reach")
+    rows_of, radius = unchecked_rows(mesh), number_from_zero(reach, "reach")
+    if isinstance(sources, SurfacePoints):
+        require_on(mesh, sources, "sources")
+        pairs = zip(sources.points, sources.simplices, strict=True)
+        return np.stack([_distances_from(mesh, rows_of, *pair, radius) for pair in pairs])
     wanted = source_sets(sources, mesh.n_points)
-    return np.array([wave(source, radius) for source in wanted]).reshape(-1, mesh.n_points)
+    ends = np.cumsum([len(source) for source in wanted], dtype=np.int64)
+    flat = np.concatenate([*wanted, np.empty(0, dtype=np.int64)])
+    return rows_of(flat, ends, radius)
+
+
+def _distances_from(
+    mesh: Mesh, rows_of: Rows, place: Float[np.ndarray, " d"], simplex: Integer, reach: float
+) -> Float[np.ndarray, " n"]:
+    """Return the distances from a point of a face, of those from its corners.
+
+    The plane of the face is laid out beyond each side, as far as the other point, which two corners
+    place there: the rule by which waves cross triangles.
+    """
+    corners = mesh.simplices[simplex]
+    spots = mesh.points[corners]
+    spokes = np.linalg.norm(spots - place, axis=1)
+    rows = rows_of(corners, np.arange(1, 4), reach + spokes.max())
+    found = (rows + spokes[:, None]).min(axis=0)
+    for one, two in ((0, 1), (1, 2), (2, 0)):
+        side = np.linalg.norm(spots[[two]] - spots[one], axis=1)
+        with np.errstate(invalid="ignore", divide="ignore"):  # infinite distances place nothing
+            along, beyond = _place(np.repeat(side, mesh.n_points), rows[one], rows[two])
+            own, above = _place(side, spokes[[one]], spokes[[two]])
+            crossing = along + (own - along) * beyond / (beyond + above)
+            straight = np.hypot(own - along, above + beyond)
+            is_nearer = (crossing >= 0) & (crossing <= side) & (straight < found)
+        found = np.where(is_nearer, straight, found)
+    return np.where(found <= reach, found, np.inf)
 
 
 def source_sets(sources: ArrayLike, n_points: int) -> list[Int[np.ndarray, " s"]]:
@@ -226,18 +266,39 @@ def unchecked_waves(mesh: Mesh) -> Wave:
 
     The checks of these cost as much as a short wave.
     """
-    (fans, scale), n = _fans(mesh), mesh.n_points
-    # A wave leaves its scratch as it was, so that the next one need not fill it.
-    memory = SpareMemory(lambda: (_scratch(fans, n), np.empty(n, dtype=np.int64), np.empty(n)))
+    rows_of = unchecked_rows(mesh)
 
     def wave(sources: Int[np.ndarray, " s"], reach: float = np.inf) -> Float[np.ndarray, " n"]:
-        with memory.lend() as (scratch, reached, distances):
-            count = spread_wave(fans, reach / scale, sources, scratch, reached, distances)
-            found = np.full(n, np.inf)
-            found[reached[:count]] = in_length(distances[:count], scale, 1)
-        return found
+        return rows_of(sources, np.array([len(sources)]), reach)[0]
 
     return wave
+
+
+def unchecked_rows(mesh: Mesh) -> Rows:
+    """Return a function of sources, the ends of sets of these, and a reach from zero on.
+
+    It returns the distances of all vertices from each set, whose vertices ascend.
+    """
+    (fans, scale), n = _fans(mesh), mesh.n_points
+    # A wave leaves its scratch as it was, so that the next one need not fill it.
+    memory = SpareMemory(lambda: (_scratch(n), np.empty(n, dtype=np.int64), np.empty(n)))
+
+    def rows_of(
+        sources: Int[np.ndarray, " s"], ends: Int[np.ndarray, " k"], reach: float = np.inf
+    ) -> Float[np.ndarray, "k n"]:
+        rows, begin = np.empty((len(ends), n)), np.concatenate([[0], ends])
+
+        def fill_task(first: int) -> None:
+            some = slice(first, first + ROWS_PER_TASK)
+            own, own_ends = sources[begin[first] :], ends[some] - begin[first]
+            with memory.lend() as scratch:
+                fill_rows(fans, reach / scale, own, own_ends, *scratch, rows[some])
+            rows[some] = in_length(rows[some], scale, 1)
+
+        map_in_threads(fill_task, range(0, len(ends), ROWS_PER_TASK))
+        return rows
+
+    return rows_of
 
 
 def farthest_points(
@@ -287,46 +348,25 @@ def farthest_points(
     [4.0, 0.0]
     """
     mesh = as_simplicial(mesh)
-    wave, n = unchecked_waves(mesh), mesh.n_points
+    (fans, scale), n = _fans(mesh), mesh.n_points
     count = whole_number(count, "count", 1, n)
-    chosen, rows = np.empty(count, dtype=np.int64), np.empty((count, n))
-    least, nearest = np.full(n, np.inf), np.zeros(n, dtype=np.int64)
-    first = int(wave(np.array([0])).argmax())
+    chosen, least, nearest = np.zeros(count, dtype=np.int64), np.empty(n), np.empty(n, np.int64)
     # Each choice waits for the wave before it. So where all distances are wanted, waves that only
     # reach what they come nearest to make the choices, and long ones follow, side by side. The short
     # ones add about a fiftieth.
     everywhere = bool(np.isinf(number_from_zero(reach, "reach")))
-    shortest = 0.0 if everywhere else reach
-    choices = islice(farthest_first(wave, n, first, reach=shortest), count)
-    for number, (vertex, row) in enumerate(choices):
-        chosen[number] = vertex
-        nearer = row < least
-        least[nearer], nearest[nearer] = row[nearer], number
-        if not everywhere:
-            rows[number] = row
+    rows = np.empty((0 if everywhere else count, n))
+    scratch = _scratch(n), np.empty(n, dtype=np.int64), np.empty(n)
+    # The first one is that farthest from vertex 0.
+    fill_rows(fans, np.inf, chosen[:1], np.array([1]), *scratch, least[None])
+    chosen[0] = least.argmax()
+    radius = 0.0 if everywhere else reach / scale
+    choose_farthest(fans, radius, *scratch, chosen, least, nearest, rows)
     if everywhere:
-
-        def fill_row(number: int) -> None:
-            rows[number] = wave(chosen[number : number + 1])
-
-        map_in_threads(fill_row, range(count))
+        return chosen, unchecked_rows(mesh)(chosen, np.arange(1, count + 1)), nearest
+    for row in rows:
+        row[:] = in_length(row, scale, 1)
     return chosen, rows, nearest
-
-
-def farthest_first(
-    wave: Wave, n: int, first: int, *, reach: float = 0.0
-) -> Iterator[tuple[int, Float[np.ndarray, " n"]]]:
-    """Yield vertices without end, each as far as possible from those before, and their distances.
-
-    Distances are computed up to `reach`, and always as far as they are smaller than those from all
-    vertices before.
-    """
-    least, vertex = np.full(n, np.inf), first
-    while True:
-        row = wave(np.array([vertex]), max(reach, least.max()))
-        yield vertex, row
-        np.minimum(least, row, out=least)
-        vertex = int(least.argmax())
 
 
 @one_blas_thread()
@@ -400,21 +440,18 @@ def average_geodesic_distance(
     return shares @ distances
 
 
-def _scratch(fans: Fans, n_sources: int) -> Any:
-    """Return the memory that `spread_wave` needs while it runs."""
-    n, n_waves = len(fans[0]) - 1, len(fans[1]) + n_sources
-    vertices, settled = np.empty((2, n), dtype=np.int64), np.zeros(n, dtype=np.bool_)
-    heap = np.empty(n_waves), np.empty(n_waves, dtype=np.int64)
-    return np.full(n, np.inf), settled, *vertices, *heap
+def _scratch(n: int) -> Any:
+    """Return the memory that a wave over n vertices needs while it runs."""
+    senders, places, heap = np.empty((3, n), dtype=np.int64)
+    return np.full(n, np.inf), np.zeros(n, dtype=np.bool_), senders, places, np.empty(n), heap
 
 
 def _fans(mesh: Mesh) -> tuple[Fans, float]:
-    """List the triangles at each vertex: where they start, their other two corners, seven lengths.
+    """List the triangles at each vertex: where they start, their other two corners, three lengths.
 
-    Also return the scale of these lengths.
-
-    The lengths of a triangle are those from the vertex to each other corner and between these two,
-    and the places of both corners (`_place`), which every wave would compute anew.
+    The lengths of a triangle are those from the vertex to each other corner and between these two.
+    Also return the scale of these lengths. That a wave computes the places of corners from these anew
+    takes less time than to read them.
     """
     if mesh.dim != 2:
         raise InvalidShapeError(
@@ -426,14 +463,10 @@ def _fans(mesh: Mesh) -> tuple[Fans, float]:
     a, b, c = corners.transpose(1, 0, 2)
     ab, bc, ca = (np.linalg.norm(side, axis=1) for side in (b - a, c - b, a - c))
     sides = (ab, ca, bc), (bc, ab, ca), (ca, bc, ab)  # as seen from a, b and c
-    lengths = [
-        np.column_stack([one, two, across, *_place(two, one, across), *_place(one, two, across)])
-        for one, two, across in sides
-    ]
+    lengths = np.concatenate([np.column_stack(three) for three in sides])
     order = np.argsort(triples[:, 0], kind="stable")
     starts = np.searchsorted(triples[order, 0], np.arange(mesh.n_points + 1))
-    one, two = (np.ascontiguousarray(triples[order, place]) for place in (1, 2))
-    return (starts, one, two, np.concatenate(lengths)[order]), scale
+    return (starts, triples[order, 1:].astype(np.int32), lengths[order]), scale
 
 
 def _place(

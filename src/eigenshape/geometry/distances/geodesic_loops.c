@@ -3,45 +3,48 @@
 
 /* Stands for the source of a vertex that a straight front of several sources reached. */
 enum { FRONT = -1 };
+enum { CHILDREN = 4 };                 /* of an entry of the heap: fewer levels than with two */
+static const double ABOVE = 1 + 1e-14; /* more than the rounding of a square */
+static const double LEAST_SQUARE = 0x1p-900; /* smaller ones are not exact to so many digits */
 
-/* Entries starts[v] to starts[v + 1] are the triangles at vertex v. */
+/* Entries starts[v] to starts[v + 1] are the triangles at vertex v: their other two corners, and the
+   lengths from v to each of these and between them. */
 struct fans {
-    const int64_t *starts, *first_corner, *second_corner;
-    const double (*sides)[7];
+    const int64_t *starts;
+    const int32_t (*corners)[2];
+    const double (*lengths)[3];
 };
 
-/* Memory of a wave: for each vertex its distance, whether it is settled, its source, and a list of
-   those touched; then the heap. The sender is the source from which a vertex was reached. */
+/* Memory of a wave: for each vertex its distance, whether it is settled, its source, and its place in
+   the heap; then the heap, which has one entry a vertex. */
 struct scratch {
     double *distance;
     bool *settled;
-    int64_t *sender, *touched;
-    double *heap_keys;
-    int64_t *heap_ids;
-};
-
-/* A corner of a triangle, seen from a vertex v: its distance from v, and its place along the edge
-   from v to the other corner and away from it. */
-struct corner {
-    int64_t vertex;
-    double away, x, y;
+    int64_t *sender, *place;
+    double *keys;
+    int64_t *ids;
 };
 
 /* The distance of a triangle's third corner from a source beyond the opposite edge.
 
    `near` and `far` are the distances of the edge's ends from the source, which is unfolded into the
    plane of the triangle. The third corner is at (x, y): along the edge from the near end, and away
-   from it. The distance is infinite if the straight line misses the edge. */
-static double through_edge(double near, double far, double length, double x, double y) {
+   from it. The distance is infinite if the straight line misses the edge, or if it is longer than
+   `limit`, which is found out first because it is cheaper. */
+static double through_edge(double near, double far, double length, double x, double y,
+                           double limit) {
     if (length == 0) return INFINITE; /* the wave walks around this point along the other edges */
     double along = (near * near - far * far + length * length) / (2 * length);
     double square = near * near - along * along;
     double away = square_root(maximum(square, 0));
-    double depth = away + y;
+    double depth = away + y, across = x - along;
+    double longest = limit * limit;
+    if (longest > LEAST_SQUARE && across * across + depth * depth > ABOVE * longest)
+        return INFINITE;
     if (depth == 0) return INFINITE;
-    double crossing = along + (x - along) * away / depth;
+    double crossing = along + across * away / depth;
     if (crossing < 0 || crossing > length) return INFINITE;
-    return hypotenuse(x - along, depth);
+    return hypotenuse(across, depth);
 }
 
 /* The distance of the third corner from a straight front (Kimmel and Sethian 1998). A front is
@@ -57,105 +60,138 @@ static double across_edge(double near, double far, double length, double x, doub
     return near + climb * x + steep * y;
 }
 
-/* Put an entry into a heap of some height. */
-static void raise_entry(double *keys, int64_t *ids, int64_t height, double key, int64_t id) {
-    int64_t place = height;
+/* Move an entry of the heap up from a place to where it belongs. */
+static void raise_entry(const struct scratch *at, int64_t place, double key, int64_t id) {
     while (place) {
-        int64_t above = (place - 1) / 2;
-        if (keys[above] <= key) break;
-        keys[place] = keys[above];
-        ids[place] = ids[above];
+        int64_t above = (place - 1) / CHILDREN;
+        if (at->keys[above] <= key) break;
+        at->keys[place] = at->keys[above];
+        at->ids[place] = at->ids[above];
+        at->place[at->ids[place]] = place;
         place = above;
     }
-    keys[place] = key;
-    ids[place] = id;
+    at->keys[place] = key;
+    at->ids[place] = id;
+    at->place[id] = place;
+}
+
+/* The place of the least of the children of an entry, of which the first is there. Without a branch if
+   all four are there: which one is least cannot be foreseen. */
+static int64_t least_child(const double *keys, int64_t first, int64_t height) {
+    if (first + CHILDREN <= height) {
+        int64_t one = first + (keys[first + 1] < keys[first]);
+        int64_t two = first + 2 + (keys[first + 3] < keys[first + 2]);
+        return keys[two] < keys[one] ? two : one;
+    }
+    int64_t least = first;
+    for (int64_t other = first + 1; other < height; other++)
+        least = keys[other] < keys[least] ? other : least;
+    return least;
 }
 
 /* Put the last entry of a heap in place of the first; the height is that without it. */
-static void sink_last(double *keys, int64_t *ids, int64_t height) {
-    double key = keys[height];
-    int64_t id = ids[height], place = 0;
-    for (;;) {
-        int64_t below = 2 * place + 1;
-        if (below >= height) break;
-        if (below + 1 < height && keys[below + 1] < keys[below]) below++;
-        if (keys[below] >= key) break;
-        keys[place] = keys[below];
-        ids[place] = ids[below];
+static void sink_last(const struct scratch *at, int64_t height) {
+    double key = at->keys[height];
+    int64_t id = at->ids[height], place = 0;
+    for (int64_t first = 1; first < height; first = CHILDREN * place + 1) {
+        int64_t below = least_child(at->keys, first, height);
+        if (at->keys[below] >= key) break;
+        at->keys[place] = at->keys[below];
+        at->ids[place] = at->ids[below];
+        at->place[at->ids[place]] = place;
         place = below;
     }
-    keys[place] = key;
-    ids[place] = id;
+    at->keys[place] = key;
+    at->ids[place] = id;
+    at->place[id] = place;
 }
 
-/* A wave on its way. */
-struct wave {
-    struct scratch at;
-    int64_t n_touched, height;
-};
-
-/* When a wave from a settled vertex reaches a corner, and from which source: along the edge, or
-   through the triangle if its other corner is settled as well. */
-static double arrival_at(const struct scratch *at, int64_t vertex, const struct corner *corner,
-                         const struct corner *other, int64_t *source) {
-    double key = at->distance[vertex], arrival = key + corner->away;
-    *source = at->sender[vertex];
-    if (!at->settled[other->vertex]) return arrival;
-    double far = at->distance[other->vertex];
-    bool same = *source == at->sender[other->vertex] && *source != FRONT;
-    double flat = same ? through_edge(key, far, other->away, corner->x, corner->y)
-                       : across_edge(key, far, other->away, corner->x, corner->y);
-    if (!(flat < arrival)) return arrival;
-    if (!same) *source = FRONT;
-    return flat;
-}
-
-/* Send a wave from a settled vertex to one corner of a triangle there. */
-static void reach_corner(struct wave *wave, int64_t vertex, const struct corner *corner,
-                         const struct corner *other) {
-    const struct scratch *at = &wave->at;
-    int64_t to = corner->vertex, source;
-    if (at->settled[to]) return;
-    double arrival = arrival_at(at, vertex, corner, other, &source);
-    if (!(arrival < at->distance[to])) return;
-    if (at->distance[to] == INFINITE) at->touched[wave->n_touched++] = to;
+/* Note an arrival at a vertex if it is the earliest so far; return the height of the heap. */
+static int64_t arrive(const struct scratch *at, int64_t height, int64_t to, double arrival,
+                      int64_t source) {
+    double before = at->distance[to];
+    if (!(arrival < before)) return height;
     at->distance[to] = arrival;
     at->sender[to] = source;
-    raise_entry(at->heap_keys, at->heap_ids, wave->height++, arrival, to);
+    bool is_new = before == INFINITE;
+    raise_entry(at, is_new ? height : at->place[to], arrival, to);
+    return height + is_new;
 }
 
-KERNEL int64_t spread_wave(const struct fans *fans, double radius, const int64_t *sources,
-                           const struct scratch *scratch, int64_t *reached, double *distances,
-                           int64_t n_sources) {
-    struct scratch at = *scratch;
-    struct wave wave = {at, n_sources, n_sources};
-    for (int64_t i = 0; i < n_sources; i++) {
-        int64_t source = sources[i];
-        at.distance[source] = at.heap_keys[i] = 0;
-        at.sender[source] = at.touched[i] = at.heap_ids[i] = source;
+/* A triangle in which two corners are settled, the nearer one first: lengths from each of these to the
+   third corner, and between them. */
+struct crossing {
+    double near, far, from_near, from_far, between;
+};
+
+/* When a wave reaches the third corner of a triangle: along the edge or through the triangle, of
+   which *is_flat tells. Nothing after `limit` counts. */
+static double arrival_through(struct crossing at, bool same, double limit, bool *is_flat) {
+    double arrival = at.near + at.from_near, length = at.between;
+    double edge = length > 0 ? length : 1; /* no wave passes through an edge without length */
+    /* The place of the corner along the edge between the others, and away from it. */
+    double x = (at.from_near * at.from_near - at.from_far * at.from_far + length * length);
+    x /= 2 * edge;
+    double square = at.from_near * at.from_near - x * x, y = square_root(maximum(square, 0));
+    double flat = same ? through_edge(at.near, at.far, length, x, y, minimum(arrival, limit))
+                       : across_edge(at.near, at.far, length, x, y);
+    *is_flat = flat < arrival;
+    return *is_flat ? flat : arrival;
+}
+
+/* Send a wave on from a settled vertex through one triangle; return the height of the heap. */
+static inline int64_t cross_triangle(const struct scratch *at, int64_t height, int64_t vertex,
+                                     const int32_t corners[2], const double lengths[3]) {
+    int64_t one = corners[0], two = corners[1], source = at->sender[vertex];
+    double key = at->distance[vertex];
+    bool is_settled = at->settled[one];
+    if (is_settled == at->settled[two]) {
+        if (is_settled) return height;
+        height = arrive(at, height, one, key + lengths[0], source);
+        return arrive(at, height, two, key + lengths[1], source);
     }
-    int64_t n_reached = 0;
-    while (wave.height) {
-        double key = at.heap_keys[0];
-        int64_t vertex = at.heap_ids[0];
-        sink_last(at.heap_keys, at.heap_ids, --wave.height);
-        if (at.settled[vertex]) continue;
-        if (key > radius) break;
-        at.settled[vertex] = true;
+    int64_t to = is_settled ? two : one, other = is_settled ? one : two;
+    bool same = source == at->sender[other] && source != FRONT, is_flat;
+    struct crossing crossing = {key, at->distance[other], lengths[is_settled], lengths[2],
+                                lengths[!is_settled]};
+    double arrival = arrival_through(crossing, same, at->distance[to], &is_flat);
+    return arrive(at, height, to, arrival, is_flat && !same ? FRONT : source);
+}
+
+/* Have the triangles of a vertex in the cache when it is settled: they wait for memory otherwise. */
+static void fetch_triangles(const struct fans *fans, int64_t vertex) {
+    int64_t first = fans->starts[vertex];
+    __builtin_prefetch(&fans->corners[first]);
+    __builtin_prefetch(&fans->lengths[first]);
+    __builtin_prefetch((const char *)&fans->lengths[first] + 64);
+    __builtin_prefetch((const char *)&fans->lengths[first] + 128);
+}
+
+/* Spread a wave from some sources. Write the vertices within the radius and their distances, the
+   nearest first, and return their number. */
+static int64_t spread(const struct fans *fans, double radius, const int64_t *sources,
+                      int64_t n_sources, const struct scratch *scratch, int64_t *reached,
+                      double *distances) {
+    const struct scratch at = *scratch;
+    int64_t height = 0, n_reached = 0;
+    for (int64_t i = 0; i < n_sources; i++) height = arrive(&at, height, sources[i], 0, sources[i]);
+    while (height && at.keys[0] <= radius) {
+        int64_t vertex = at.ids[0];
         reached[n_reached] = vertex;
-        distances[n_reached++] = key;
-        for (int64_t entry = fans->starts[vertex]; entry < fans->starts[vertex + 1]; entry++) {
-            const double *side = fans->sides[entry];
-            struct corner one = {fans->first_corner[entry], side[0], side[3], side[4]};
-            struct corner two = {fans->second_corner[entry], side[1], side[5], side[6]};
-            reach_corner(&wave, vertex, &one, &two);
-            reach_corner(&wave, vertex, &two, &one);
-        }
+        distances[n_reached++] = at.keys[0];
+        sink_last(&at, --height);
+        if (height) fetch_triangles(fans, at.ids[0]);
+        at.settled[vertex] = true;
+        for (int64_t entry = fans->starts[vertex]; entry < fans->starts[vertex + 1]; entry++)
+            height =
+                cross_triangle(&at, height, vertex, fans->corners[entry], fans->lengths[entry]);
     }
-    for (int64_t i = 0; i < wave.n_touched; i++) {
-        at.distance[at.touched[i]] = INFINITE;
-        at.settled[at.touched[i]] = false;
+    /* Leave the scratch as it was: vertices that were reached are settled or in the heap. */
+    for (int64_t i = 0; i < n_reached; i++) {
+        at.distance[reached[i]] = INFINITE;
+        at.settled[reached[i]] = false;
     }
+    for (int64_t i = 0; i < height; i++) at.distance[at.ids[i]] = INFINITE;
     return n_reached;
 }
 
@@ -166,8 +202,48 @@ KERNEL int64_t spread_waves(const struct fans *fans, double radius, const int64_
     for (int64_t i = 0; i < n_sources; i++) {
         if (total + n > room) return i;
         counts[i] =
-            spread_wave(fans, radius, &sources[i], scratch, &reached[total], &distances[total], 1);
+            spread(fans, radius, &sources[i], 1, scratch, &reached[total], &distances[total]);
         total += counts[i];
     }
     return n_sources;
+}
+
+/* Write distances into a row of all vertices. */
+static void fill_row(double *row, int64_t n, const int64_t *reached, const double *distances,
+                     int64_t count) {
+    for (int64_t i = 0; i < n; i++) row[i] = INFINITE;
+    for (int64_t i = 0; i < count; i++) row[reached[i]] = distances[i];
+}
+
+KERNEL void fill_rows(const struct fans *fans, double radius, const int64_t *sources,
+                      const int64_t *ends, const struct scratch *scratch, int64_t *reached,
+                      double *distances, double *rows, int64_t n_starts, int64_t n_rows) {
+    int64_t first = 0, n = n_starts - 1;
+    for (int64_t i = 0; i < n_rows; first = ends[i++]) {
+        int64_t count =
+            spread(fans, radius, &sources[first], ends[i] - first, scratch, reached, distances);
+        fill_row(&rows[i * n], n, reached, distances, count);
+    }
+}
+
+KERNEL void choose_farthest(const struct fans *fans, double radius, const struct scratch *scratch,
+                            int64_t *reached, double *distances, int64_t *chosen, double *least,
+                            int64_t *nearest, double *rows, int64_t n_starts, int64_t n_chosen,
+                            int64_t n_rows) {
+    int64_t n = n_starts - 1, farthest = chosen[0];
+    for (int64_t v = 0; v < n; v++) least[v] = INFINITE;
+    for (int64_t number = 0; number < n_chosen; number++) {
+        chosen[number] = farthest;
+        double needed = maximum(radius, least[farthest]);
+        int64_t count = spread(fans, needed, &farthest, 1, scratch, reached, distances);
+        if (number < n_rows) fill_row(&rows[number * n], n, reached, distances, count);
+        for (int64_t i = 0; i < count; i++) {
+            int64_t v = reached[i];
+            if (!(distances[i] < least[v])) continue;
+            least[v] = distances[i];
+            nearest[v] = number;
+        }
+        farthest = 0;
+        for (int64_t v = 1; v < n; v++) farthest = least[v] > least[farthest] ? v : farthest;
+    }
 }

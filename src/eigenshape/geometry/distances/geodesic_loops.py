@@ -1,47 +1,27 @@
-"""Kernels of `geodesic`: a wave that starts at some vertices and crosses unfolded triangles."""
+"""Kernels of `geodesic`: waves that start at some vertices and cross unfolded triangles.
+
+`fans` holds `starts`, `corners` and `lengths`. Entries starts[v] to starts[v + 1] are the triangles at
+vertex v: their other two corners, and the lengths from v to each of these and between them.
+
+`scratch` holds, for each vertex: its distance (infinite on entry and on return), whether it is settled
+(False on entry and on return), its source, and its place in the heap; then the keys and vertices of
+the heap. `reached` and `distances` are scratch, too, where a kernel fills rows.
+"""
 
 import numpy as np
-from jaxtyping import Bool, Float64, Int64
+from jaxtyping import Bool, Float64, Int32, Int64
 
 from certeig.kit.kernels import Out, kernel
 
-Fans = tuple[
-    Int64[np.ndarray, " n_starts"],
-    Int64[np.ndarray, " k"],
-    Int64[np.ndarray, " k"],
-    Float64[np.ndarray, "k 7"],
-]
+Fans = tuple[Int64[np.ndarray, " n_starts"], Int32[np.ndarray, "k 2"], Float64[np.ndarray, "k 3"]]
 Scratch = tuple[
     Out[Float64[np.ndarray, " n_starts-1"]],
     Out[Bool[np.ndarray, " n_starts-1"]],
     Out[Int64[np.ndarray, " n_starts-1"]],
     Out[Int64[np.ndarray, " n_starts-1"]],
-    Out[Float64[np.ndarray, " n_waves"]],
-    Out[Int64[np.ndarray, " n_waves"]],
+    Out[Float64[np.ndarray, " n_starts-1"]],
+    Out[Int64[np.ndarray, " n_starts-1"]],
 ]
-
-
-@kernel("n_sources")
-def spread_wave(
-    fans: Fans,
-    radius: float,
-    sources: Int64[np.ndarray, " n_sources"],
-    scratch: Scratch,
-    reached: Out[Int64[np.ndarray, " n_starts-1"]],
-    distances: Out[Float64[np.ndarray, " n_starts-1"]],
-) -> int:
-    """Fill the vertices within `radius` of some sources and their distances; return their number.
-
-    `fans` holds `starts`, `first_corner`, `second_corner` and `sides`. Entries starts[v] to
-    starts[v + 1] are the triangles at vertex v: their other two corners, and seven lengths: from v
-    to each of these, between them, and the place of either in coordinates along the edge from v to
-    the other one and away from it.
-
-    `scratch` holds, for each vertex: its distance (infinite on entry and on return), whether it is
-    settled (False on entry and on return), its source, and a list of the vertices that were
-    touched. It also holds the keys and vertices of the heap, which has one entry for each corner of
-    a triangle and each source, since a triangle sends at most three waves.
-    """
 
 
 @kernel("n_starts", "n_sources", "room")
@@ -56,6 +36,42 @@ def spread_waves(
 ) -> int:
     """Spread one wave from each source, and return for how many sources there was room.
 
-    Wave i fills the next counts[i] entries of `reached` and `distances`. It begins only if a wave
-    over all vertices would fit there. The other arguments are those of `spread_wave`.
+    Wave i fills the next counts[i] entries of `reached` with the vertices within `radius`, and of
+    `distances`. It begins only if a wave over all vertices would fit there.
+    """
+
+
+@kernel("n_starts", "n_rows")
+def fill_rows(
+    fans: Fans,
+    radius: float,
+    sources: Int64[np.ndarray, " _"],
+    ends: Int64[np.ndarray, " n_rows"],
+    scratch: Scratch,
+    reached: Out[Int64[np.ndarray, " n_starts-1"]],
+    distances: Out[Float64[np.ndarray, " n_starts-1"]],
+    rows: Out[Float64[np.ndarray, "n_rows n_starts-1"]],
+) -> None:
+    """Write the distances of all vertices from each set of sources, infinite beyond `radius`.
+
+    Set i begins where the one before it ends, and ends before `ends[i]`.
+    """
+
+
+@kernel("n_starts", "n_chosen", "n_rows")
+def choose_farthest(
+    fans: Fans,
+    radius: float,
+    scratch: Scratch,
+    reached: Out[Int64[np.ndarray, " n_starts-1"]],
+    distances: Out[Float64[np.ndarray, " n_starts-1"]],
+    chosen: Out[Int64[np.ndarray, " n_chosen"]],
+    least: Out[Float64[np.ndarray, " n_starts-1"]],
+    nearest: Out[Int64[np.ndarray, " n_starts-1"]],
+    rows: Out[Float64[np.ndarray, "n_rows n_starts-1"]],
+) -> None:
+    """Choose vertices from `chosen[0]` on, each as far as possible from those before.
+
+    Write also the distance of each vertex from the nearest of them, by number, and as many rows of
+    distances from each as `rows` has. Waves end at `radius`, but no earlier than they come nearest.
     """

@@ -4,15 +4,15 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from certeig.kit.arrays import ReadOnly, record
+from eigenshape._vectors import size_one, triangle_areas
 from eigenshape.geometry.distances.closest_loops import nearest_faces
 from eigenshape.geometry.distances.crossing_loops import box_tree, curve_places, face_boxes
 from eigenshape.geometry.distances.crossings import round_finely
 from eigenshape.geometry.distances.nesting_loops import are_inside
 from eigenshape.geometry.face_turns import FaceTurns, face_turns, turn_faces
-from eigenshape.geometry.measure import triangle_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.orientation import orient_outward
-from eigenshape.geometry.simplices import scaled_corners, size_one
+from eigenshape.geometry.simplices import scaled_corners
 from eigenshape.geometry.topology import edge_table, submesh
 
 # Signed volumes up to this share of area^1.5 are rounding, and do not tell which side is outside.

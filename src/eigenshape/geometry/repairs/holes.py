@@ -4,10 +4,11 @@ import numpy as np
 from jaxtyping import Int
 
 from certeig.kit.errors import InvalidParameterError
+from eigenshape._errors import count_nouns
+from eigenshape._vectors import size_one
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.hole_loops import triangulate
-from eigenshape.geometry.repairs.repair_report import RepairedMesh, count_nouns
-from eigenshape.geometry.simplices import size_one
+from eigenshape.geometry.repairs.repair_report import RepairedMesh
 from eigenshape.geometry.topology import boundary_loops, edge_table, half_edges, neighbor_links
 
 

@@ -1,7 +1,6 @@
 """A part of a surface that a mask of vertices keeps, and values on it put back on the whole."""
 
 import warnings
-from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -10,15 +9,11 @@ from certeig.kit.arrays import real_numbers, whole_number, whole_numbers
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike, Integer
 from eigenshape._arrays import vertex_values
+from eigenshape._errors import count_nouns
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.repairs.repair_report import RepairedMesh, count_nouns
+from eigenshape.geometry.repairs.repair_report import RepairedMesh
 from eigenshape.geometry.topology import submesh, vertex_components
-
-# Share of the vertices of a hemisphere that lie on its side of x = 0. On eight cortices of humans,
-# macaques and marmosets it is 0.987 or more, and 0.5 on spheres and inflated surfaces, which are
-# centered.
-ONE_SIDED = 0.9
 
 
 def mask_surface(mesh: MeshLike, mask: ArrayLike) -> RepairedMesh[TriangleMesh]:
@@ -148,11 +143,3 @@ def unmask(
         ) from err
     whole[places] = rows
     return whole
-
-
-def hemisphere_of(mesh: TriangleMesh) -> Literal["left", "right", ""]:
-    """Return the side on which a cortex lies, if it lies on one: x points to the right."""
-    share = float((mesh.vertices[:, 0] < 0).mean())
-    if share >= ONE_SIDED:
-        return "left"
-    return "right" if share <= 1 - ONE_SIDED else ""

@@ -4,10 +4,11 @@ import numpy as np
 from jaxtyping import Bool, Int
 from scipy.sparse.csgraph import dijkstra
 
+from eigenshape._arrays import label_components
+from eigenshape._errors import count_nouns
 from eigenshape.geometry.face_turns import double_cover, face_neighbors, face_turns, turn_faces
-from eigenshape.geometry.facet_lists import label_components
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.repairs.repair_report import RepairedMesh, count_nouns
+from eigenshape.geometry.repairs.repair_report import RepairedMesh
 from eigenshape.geometry.topology import edge_table
 
 

@@ -2,10 +2,11 @@
 
 import numpy as np
 
+from eigenshape._errors import count_nouns
 from eigenshape.geometry.distances.nesting import faces_to_turn
 from eigenshape.geometry.face_turns import turn_faces
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.repairs.repair_report import RepairedMesh, count_nouns
+from eigenshape.geometry.repairs.repair_report import RepairedMesh
 
 
 def orient(mesh: TriangleMesh) -> RepairedMesh[TriangleMesh]:

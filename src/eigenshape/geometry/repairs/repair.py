@@ -7,9 +7,9 @@ from typing import Any, overload
 import numpy as np
 
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import size_one, triangle_areas
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.conversion import MeshLike, ShapeLike, as_shape
-from eigenshape.geometry.measure import triangle_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.holes import fill_holes
 from eigenshape.geometry.repairs.one_sided import cut_one_sided
@@ -31,7 +31,7 @@ from eigenshape.geometry.repairs.repair_steps import (
     weld,
     weld_seams,
 )
-from eigenshape.geometry.simplices import scaled_corners, size_one
+from eigenshape.geometry.simplices import scaled_corners
 from eigenshape.geometry.topology import boundary_loops, vertex_components
 
 # Shares of the area of a surface up to which `suggest_repairs` takes something for a fault of the

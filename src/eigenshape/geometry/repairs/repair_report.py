@@ -12,9 +12,6 @@ from eigenshape.geometry.simplicial import Mesh
 
 MeshT = TypeVar("MeshT", bound=Mesh)
 
-# Nouns of reports whose plural is not formed with an s.
-PLURALS = {"vertex": "vertices", "tetrahedron": "tetrahedra", "simplex": "simplices"}
-
 
 @record
 class RepairedMesh(ReadOnly, Generic[MeshT]):
@@ -71,11 +68,6 @@ class RepairedCloud(ReadOnly):
     cloud: PointCloud
     report: tuple[str, ...]
     source_points: Int[np.ndarray, " n"]
-
-
-def count_nouns(number: int, noun: str) -> str:
-    """Return a number with its noun, which is in the plural if the number is not 1."""
-    return f"{number} {noun if number == 1 else PLURALS.get(noun, noun + 's')}"
 
 
 def simplex_noun(mesh: Mesh) -> str:

@@ -7,15 +7,15 @@ from jaxtyping import Bool, Int
 from scipy.spatial import cKDTree
 
 from certeig.kit.errors import InvalidParameterError
+from eigenshape._arrays import label_components, number_places
+from eigenshape._errors import count_nouns
+from eigenshape._vectors import size_one, triangle_areas
 from eigenshape.geometry.cloud import PointCloud
-from eigenshape.geometry.facet_lists import label_components
-from eigenshape.geometry.measure import triangle_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair_report import (
     MeshT,
     RepairedCloud,
     RepairedMesh,
-    count_nouns,
     simplex_noun,
 )
 from eigenshape.geometry.seams import seams
@@ -24,12 +24,10 @@ from eigenshape.geometry.simplices import (
     degenerate_simplices,
     scaled_corners,
     side_lengths,
-    size_one,
 )
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.geometry.topology import (
     edge_table,
-    number_places,
     repeated_simplices,
     require_simplices_everywhere,
     submesh,

@@ -6,18 +6,17 @@ from jaxtyping import Float, Int
 from certeig.kit.arrays import ReadOnly, as_array, record, whole_number
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike, Integer
-from eigenshape._errors import InvalidShapeError
+from eigenshape._errors import InvalidShapeError, count_nouns
 from eigenshape._extras import import_extra
+from eigenshape._vectors import size_one
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.distances.closest import closest_points
 from eigenshape.geometry.face_turns import orient_consistently
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.one_sided import cut_edges, cut_one_sided
-from eigenshape.geometry.repairs.repair_report import count_nouns
 from eigenshape.geometry.repairs.repair_steps import drop_unreferenced
 from eigenshape.geometry.requirements import require_oriented, require_sound
 from eigenshape.geometry.samples.surface_points import SurfacePoints
-from eigenshape.geometry.simplices import size_one
 from eigenshape.geometry.topology import edge_table, non_manifold_vertices
 
 FEWEST_FACES = 4  # of a closed surface

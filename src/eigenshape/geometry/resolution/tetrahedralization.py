@@ -9,8 +9,10 @@ from threading import Lock
 import numpy as np
 
 from certeig.kit.arrays import positive_number
+from eigenshape._arrays import number_places
 from eigenshape._errors import InvalidShapeError
 from eigenshape._extras import import_extra
+from eigenshape._vectors import size_one
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.distances.crossings import self_intersections
 from eigenshape.geometry.distances.nesting import Pieces, find_pieces
@@ -19,9 +21,9 @@ from eigenshape.geometry.facets import facet_table
 from eigenshape.geometry.measure import enclosed_volume
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_oriented, require_sound
-from eigenshape.geometry.simplices import simplex_volumes, size_one
+from eigenshape.geometry.simplices import simplex_volumes
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.geometry.topology import edge_table, number_places
+from eigenshape.geometry.topology import edge_table
 
 WITHOUT_LIMIT = 1e10  # Netgen's own; the surface has size 1
 ONE_MESHER = Lock()  # Netgen keeps what it is doing in global variables

@@ -3,6 +3,7 @@
 import numpy as np
 from jaxtyping import Int
 
+from eigenshape._vectors import size_one
 from eigenshape.geometry.facets import facet_table
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.resolution.thinning_loops import (
@@ -11,7 +12,7 @@ from eigenshape.geometry.resolution.thinning_loops import (
     collapse_short_edges,
     link_corners,
 )
-from eigenshape.geometry.simplices import mean_side_length, size_one
+from eigenshape.geometry.simplices import mean_side_length
 from eigenshape.geometry.topology import submesh
 
 # Edges collapse up to this length first, in mean edge lengths, and then up to LENGTH_GROWTH times the last

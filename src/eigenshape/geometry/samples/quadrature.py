@@ -9,11 +9,12 @@ from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike, Integer
 from eigenshape._arrays import finite_rows
 from eigenshape._errors import InvalidShapeError, try_auto
+from eigenshape._vectors import size_one
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import ShapeLike, as_shape
 from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.samples.cell_loops import cell_areas
-from eigenshape.geometry.simplices import dual_volumes, in_length, size_one
+from eigenshape.geometry.simplices import dual_volumes, in_length
 
 
 @record

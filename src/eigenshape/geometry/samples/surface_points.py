@@ -1,15 +1,21 @@
 """Points anywhere on a mesh, given by a simplex and barycentric coordinates."""
 
+from typing import Any
+
 import numpy as np
 from jaxtyping import Float, Int
 
-from certeig.kit.arguments import require_type
+from certeig.kit.arguments import describe_value, require_type
 from certeig.kit.arrays import ReadOnly, record, whole_number
+from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
-from eigenshape.geometry.simplices import require_volumes, scaled_corners, volumes
+from eigenshape.geometry.requirements import require_volumes
+from eigenshape.geometry.simplices import scaled_corners, volumes
 from eigenshape.geometry.simplicial import Mesh
 
+# A point farther from where its weights put it, in extents of the mesh, belongs to another mesh.
+ELSEWHERE = 1e-6
 # More points would take many gigabytes: a point on a surface takes 56 bytes, and twice that while
 # it is drawn.
 MOST_POINTS = 10**8
@@ -103,3 +109,34 @@ def place_points(
     """Return the points with given barycentric coordinates in given simplices."""
     points = np.einsum("pc,pcd->pd", weights, mesh.points[mesh.simplices[simplices]])
     return SurfacePoints(points, simplices, weights)
+
+
+def vertex_number(n_vertices: int, vertex: Any, name: str) -> int:
+    """Return a vertex that was given where a SurfacePoints could be; raise an error if it is none."""
+    if not hasattr(vertex, "__index__"):
+        raise InvalidParameterError(
+            f"{name} must be a vertex or a SurfacePoints; the value is {describe_value(vertex)}. Find a "
+            "point from coordinates by closest_points(mesh, [point])."
+        )
+    return whole_number(vertex, name, 0, n_vertices - 1)
+
+
+def require_one(place: SurfacePoints, name: str) -> None:
+    """Raise an error if an argument has more points than one."""
+    if place.n_points != 1:
+        raise InvalidParameterError(f"{name} must be one point; there are {place.n_points}.")
+
+
+def require_on(mesh: Mesh, places: SurfacePoints, name: str) -> None:
+    """Raise an error if points do not lie on a mesh; `name` is that of the argument."""
+    try:
+        there = place_points(mesh, places.simplices, places.weights).points
+        away = np.abs(there - places.points).max(axis=1)
+    except (IndexError, ValueError):  # no such faces, or no such numbers of weights
+        away = np.full(places.n_points, np.inf)
+    if (away > ELSEWHERE * np.ptp(mesh.points, axis=0).max()).any():
+        place = int(np.argmax(away))
+        raise InvalidParameterError(
+            f"{name} must lie on this mesh; point {place} at {places.points[place].tolist()} in face "
+            f"{places.simplices[place]} does not. Try closest_points(mesh, {name}.points)."
+        )

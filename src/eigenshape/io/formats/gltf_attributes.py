@@ -14,7 +14,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from certeig.kit.errors import FileFormatError
-from eigenshape.geometry.measure import unit_vectors
+from eigenshape._vectors import unit_vectors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.attributes import (
     Material,

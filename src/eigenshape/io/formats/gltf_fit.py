@@ -6,12 +6,8 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array
 from scipy.spatial.transform import Rotation
 
+from eigenshape._vectors import Similarities, fit_similarities, nearest_rotations
 from eigenshape.calculus.equations import solve_heat
-from eigenshape.geometry.measure import (
-    Similarities,
-    fit_similarities,
-    nearest_rotations,
-)
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import dual_volumes
 from eigenshape.io.attributes import MeshAttributes

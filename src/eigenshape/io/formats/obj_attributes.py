@@ -12,7 +12,7 @@ from jaxtyping import Float, Int
 
 from certeig.kit.errors import FileFormatError
 from certeig.kit.files import read_regular
-from eigenshape.geometry.measure import area_vectors, unit_vectors
+from eigenshape._vectors import area_vectors, unit_vectors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.polygons import cut_polygons
 from eigenshape.io.attributes import (

@@ -175,6 +175,11 @@ def suffix_in(name: str) -> str:
     return max(fitting, key=len, default=Path(name).suffix)
 
 
+def is_upright(path: Path) -> bool:
+    """Whether the y axis points up in files of this name."""
+    return suffix_in(path.name) in UPRIGHT
+
+
 def signed_suffix(path: Path) -> str:
     """Return the suffix of a file that is known by its first bytes, otherwise an empty text."""
     with path.open("rb") as file:

@@ -4,10 +4,9 @@ import numpy as np
 from jaxtyping import Float
 
 from certeig.kit.errors import FileFormatError
-from eigenshape.geometry.measure import triangle_areas
+from eigenshape._errors import count_nouns
+from eigenshape._vectors import size_one, triangle_areas
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.repairs.repair_report import count_nouns
-from eigenshape.geometry.simplices import size_one
 
 # Largest share of the shortest side of a face by which its corners may move without a word, and
 # shares of the size and the area by which corners and the whole may change at all.

@@ -10,7 +10,7 @@ Refused: a count that the file does not hold; shapes that single precision chang
 import numpy as np
 
 from certeig.kit.errors import FileFormatError
-from eigenshape.geometry.measure import unit_vectors
+from eigenshape._vectors import unit_vectors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair_steps import weld
 from eigenshape.io.formats.numbers import coordinates, end_lines, lines_of, quote_line

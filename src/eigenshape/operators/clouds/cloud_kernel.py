@@ -7,16 +7,16 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from certeig.kit.arguments import require_type
+from eigenshape._vectors import size_one
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.samples.quadrature import Quadrature, shape_quadrature
-from eigenshape.geometry.simplices import size_one
+from eigenshape.geometry.samples.spacing import neighbor_distance
 from eigenshape.operators.choices import Correction, Form
 from eigenshape.operators.clouds.kernel import (
     EDGE_FACTOR,
     KernelOptions,
     choose_kernel,
     kernel_laplacian,
-    neighbor_distance,
     require_whole,
     warn_of_few,
     warn_of_narrow,

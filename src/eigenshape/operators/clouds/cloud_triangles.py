@@ -9,9 +9,10 @@ from certeig.kit.arrays import whole_number
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import Integer
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import size_one
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.samples.quadrature import require_different_points
-from eigenshape.geometry.simplices import require_span, size_one
+from eigenshape.geometry.simplices import require_span
 from eigenshape.operators.clouds.pair_loops import local_rings
 from eigenshape.operators.tufted import (
     MOLLIFY,
@@ -72,27 +73,7 @@ def local_triangles(
     >>> int((triangles[:, 0] == 0).sum())
     6
     """
-    require_type(cloud, PointCloud, "cloud")
-    if cloud.dim != 2 or cloud.points.shape[1] != 3:
-        raise InvalidShapeError(
-            f"Triangles need points of a surface in R^3; this is a {cloud!r}. "
-            "Use point_cloud_laplacian(cloud) for other dimensions."
-        )
-    if cloud.n_points < 4:
-        raise InvalidShapeError(
-            f"Triangles need at least 4 points; the cloud has {cloud.n_points}."
-        )
-    most = cloud.n_points - 1
-    wanted = min(N_NEIGHBORS, most) if n_neighbors is None else n_neighbors
-    count = whole_number(wanted, "n_neighbors", 3, most)
-    points, _ = size_one(cloud.points)
-    distances, found = cKDTree(points).query(points, count + 1)
-    require_different_points(cloud, distances, found)
-    neighbors = found[:, 1:]
-    offsets = points[neighbors] - points[:, None]
-    # Lengths relative to the farthest neighbor: squares neither overflow nor underflow.
-    offsets /= distances[:, -1, None, None]
-    _, axes = np.linalg.eigh(np.einsum("nki,nkj->nij", offsets, offsets))
+    neighbors, offsets, axes = _neighborhoods(cloud, n_neighbors)
     normals = axes[:, :, 0]
     first = axes[:, :, 2]
     frames = np.stack([first, np.cross(normals, first)], axis=1)
@@ -116,10 +97,48 @@ def local_triangles(
         require_span(cloud.points, 2, "The points of a cloud")
         raise InvalidShapeError(
             f"Every point must have a triangle; point {bare[0]} at "
-            f"{cloud.points[bare[0]].tolist()} has none, as its {count} neighbors lie on a line "
+            f"{cloud.points[bare[0]].tolist()} has none, as its {neighbors.shape[1]} neighbors lie on a line "
             f"({bare.size} such). Try more n_neighbors."
         )
     return triangles
+
+
+def cloud_normals(cloud: PointCloud) -> Float[np.ndarray, "n 3"]:
+    """Return the normal of the best plane at each point, its largest coordinate positive.
+
+    Errors are those of `local_triangles`.
+    """
+    normals = _neighborhoods(cloud, None)[2][:, :, 0]
+    largest = np.abs(normals).argmax(axis=1)[:, None]
+    return normals * np.sign(np.take_along_axis(normals, largest, axis=1))
+
+
+def _neighborhoods(
+    cloud: PointCloud, n_neighbors: Integer | None
+) -> tuple[Int[np.ndarray, "n k"], Float[np.ndarray, "n k 3"], Float[np.ndarray, "n 3 3"]]:
+    """Return the neighbors of each point, where they lie from it, and principal axes as columns."""
+    require_type(cloud, PointCloud, "cloud")
+    if cloud.dim != 2 or cloud.points.shape[1] != 3:
+        raise InvalidShapeError(
+            f"Triangles need points of a surface in R^3; this is a {cloud!r}. "
+            "Use point_cloud_laplacian(cloud) for other dimensions."
+        )
+    if cloud.n_points < 4:
+        raise InvalidShapeError(
+            f"Triangles need at least 4 points; the cloud has {cloud.n_points}."
+        )
+    most = cloud.n_points - 1
+    wanted = min(N_NEIGHBORS, most) if n_neighbors is None else n_neighbors
+    count = whole_number(wanted, "n_neighbors", 3, most)
+    points, _ = size_one(cloud.points)
+    distances, found = cKDTree(points).query(points, count + 1)
+    require_different_points(cloud, distances, found)
+    neighbors = found[:, 1:]
+    offsets = points[neighbors] - points[:, None]
+    # Lengths relative to the farthest neighbor: squares neither overflow nor underflow.
+    offsets /= distances[:, -1, None, None]
+    _, axes = np.linalg.eigh(np.einsum("nki,nkj->nij", offsets, offsets))
+    return neighbors, offsets, axes
 
 
 def _rings(coordinates: Float[np.ndarray, "n k 2"]) -> Int[np.ndarray, "n k1"]:

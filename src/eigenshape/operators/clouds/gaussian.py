@@ -11,9 +11,11 @@ from certeig.kit.arguments import require_choice, require_type
 from certeig.kit.arrays import positive_values
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike, Integer
+from eigenshape._vectors import size_one
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.samples.quadrature import Quadrature, shape_quadrature
-from eigenshape.geometry.simplices import mean_side_length, require_span, size_one
+from eigenshape.geometry.samples.spacing import neighbor_distance
+from eigenshape.geometry.simplices import mean_side_length, require_span
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import vertex_components
 from eigenshape.operators.choices import Correction, Distance, Form
@@ -22,7 +24,6 @@ from eigenshape.operators.clouds.kernel import (
     KernelOptions,
     choose_kernel,
     kernel_laplacian,
-    neighbor_distance,
     require_whole,
     warn_of_few,
     warn_of_narrow,

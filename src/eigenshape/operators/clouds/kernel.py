@@ -11,16 +11,16 @@ from math import gamma, pi
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
-from scipy.spatial import cKDTree
 
 from certeig.kit.arguments import require_choice
 from certeig.kit.arrays import positive_values
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.memory import require_memory
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import size_one
 from eigenshape.geometry.distances.geodesic import geodesic_balls
 from eigenshape.geometry.samples.quadrature import Quadrature
-from eigenshape.geometry.simplices import LARGEST_EXPONENT, size_one
+from eigenshape.geometry.simplices import LARGEST_EXPONENT
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.operators.choices import Correction, Form
 from eigenshape.operators.clouds.cell_grid import cell_grid, count_partners, gaussian_rows
@@ -90,25 +90,6 @@ def choose_kernel(options: KernelOptions, edge: float) -> GaussianKernel:
     return GaussianKernel(
         t, factor, corrected=options.correct == "log", form=options.form, cutoff=options.cutoff
     )
-
-
-def neighbor_distance(points: Float[np.ndarray, "n d"], dim: int) -> float:
-    """Return the mean distance to the m(m+1) nearest points: as many as touch a point of the lattice A_m.
-
-    Raise InvalidShapeError if there are not so many points, or all are equal.
-    """
-    near = dim * (dim + 1)
-    if len(points) <= near:
-        raise InvalidShapeError(
-            f"A sample of dimension {dim} must have over {near} points; it has {len(points)}."
-        )
-    scaled, scale = size_one(points)
-    distance = float(cKDTree(scaled).query(scaled, near + 1)[0][:, 1:].mean() * scale)
-    if not distance > 0:
-        raise InvalidShapeError(
-            f"The points of a sample must differ; all {len(points)} are {points[0].tolist()}."
-        )
-    return distance
 
 
 def kernel_laplacian(

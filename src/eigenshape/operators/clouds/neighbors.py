@@ -8,9 +8,9 @@ from scipy.spatial import cKDTree
 from certeig.kit.arrays import positive_number, whole_number
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike, Integer
-from eigenshape._arrays import finite_rows
-from eigenshape.geometry.simplices import size_one
-from eigenshape.geometry.topology import adjacency_matrix, unique_edges
+from eigenshape._arrays import adjacency_matrix, finite_rows
+from eigenshape._vectors import size_one
+from eigenshape.geometry.topology import unique_edges
 
 SPARE = 8  # neighbors requested beyond those wanted, so that most ties are found in one query
 

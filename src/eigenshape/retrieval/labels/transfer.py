@@ -13,10 +13,9 @@ from certeig.kit.errors import InvalidParameterError
 from certeig.kit.progress import Progress
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike
-from eigenshape._arrays import point_functions
+from eigenshape._arrays import label_components, point_functions
 from eigenshape.calculus.linear_solver import factor_definite
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.facet_lists import label_components
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.normalize import normalize_mesh

@@ -7,7 +7,7 @@ enum {
     TURN_BINS = 8,
     HEIGHT_BINS = 6,
     RING_NUMBERS = TURN_BINS + HEIGHT_BINS + 2,
-    BUCKETS = 512 /* of distances, before they are sorted */
+    BUCKETS = 448 /* of distances, before they are sorted; more need a larger frame than a page */
 };
 static const double INNER = 0.35; /* share of the radius in which the disc's normal is averaged */
 static const double PI = 0x1.921fb54442d18p1;

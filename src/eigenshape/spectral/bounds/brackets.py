@@ -9,10 +9,11 @@ from certeig.kit.errors import InvalidParameterError
 from certeig.kit.progress import Progress
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import Integer
+from eigenshape._vectors import size_one
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.facets import facet_components, facet_table, without_pinches
 from eigenshape.geometry.requirements import require_sound
-from eigenshape.geometry.simplices import in_length, size_one
+from eigenshape.geometry.simplices import in_length
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import boundary_vertices
 from eigenshape.operators.choices import Condition

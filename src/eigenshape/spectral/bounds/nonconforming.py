@@ -3,9 +3,9 @@
 import numpy as np
 from jaxtyping import Float, Int
 
+from certeig.kit.arrays import EPS
 from certeig.kit.errors import ConvergenceError
 from certeig.kit.progress import Progress
-from certeig.sparse.symmetric_factor import EPS
 from eigenshape.geometry.facet_lists import FacetTable
 from eigenshape.geometry.simplices import scaled_corners, simplex_volumes, triangular_sides
 from eigenshape.geometry.simplicial import Mesh

@@ -8,10 +8,10 @@ from scipy.fft import dct
 from certeig.kit.arguments import require_type
 from certeig.kit.arrays import positive_values
 from certeig.kit.errors import InvalidParameterError
+from certeig.kit.matrices import find_zero_row_sums
 from certeig.kit.progress import Progress, silent
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike
-from certeig.matrices import find_zero_row_sums
 from certeig.solver.pencil import Pencil
 from certeig.sparse.symmetric_factor import SymmetricFactor, factorize_symmetric
 from eigenshape._arrays import point_functions

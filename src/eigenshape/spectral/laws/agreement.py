@@ -4,8 +4,8 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
+from certeig.kit.arrays import EPS
 from certeig.kit.errors import ConvergenceError
-from certeig.sparse.symmetric_factor import EPS
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.laws.outcomes import Law, Outcome, SkippedLaw, make_law
 from eigenshape.spectral.solve import solve_spectrum

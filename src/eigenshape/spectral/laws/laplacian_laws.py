@@ -9,8 +9,8 @@ from scipy.sparse.csgraph import connected_components
 
 from certeig.kit.arguments import require_type
 from certeig.kit.errors import InvalidParameterError
+from certeig.kit.matrices import ASYMMETRY
 from certeig.kit.threads import one_blas_thread
-from certeig.matrices import ASYMMETRY
 from certeig.solver.factor import Factor, factorize, rounding
 from certeig.solver.pencil import Pencil
 from eigenshape.geometry.cloud import PointCloud

@@ -6,6 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
+from certeig.kit.arrays import EPS
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.conversion import ShapeLike, as_shape
 from eigenshape.geometry.simplicial import Mesh
@@ -34,7 +35,7 @@ def with_simplices(mesh: Mesh, simplices: Int[np.ndarray, "s corners"]) -> Mesh:
 
 def jiggle(shape: Shape, rng: np.random.Generator) -> Shape:
     """Move each coordinate as far as rounding would, were the shape turned and moved by its own size."""
-    reach = 8 * np.finfo(np.float64).eps * np.abs(shape.points).max()
+    reach = 8 * EPS * np.abs(shape.points).max()
     return with_points(shape, shape.points + reach * rng.uniform(-1, 1, shape.points.shape))
 
 

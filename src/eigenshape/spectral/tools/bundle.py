@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
 
-from certeig.archive import (
+from certeig.kit.archive import (
     open_archive,
     require_finite_floats,
     take_arrays,
@@ -22,10 +22,10 @@ from certeig.archive import (
 from certeig.kit.arguments import describe_value, require_choice, require_each, require_type
 from certeig.kit.arrays import ReadOnly, record, whole_number
 from certeig.kit.errors import FileFormatError, InvalidParameterError
-from certeig.kit.files import as_path
+from certeig.kit.files import as_path, require_writable
+from certeig.kit.matrices import freeze_sparse
 from certeig.kit.progress import Callback, Progress
 from certeig.kit.typing import Integer
-from certeig.matrices import freeze_sparse
 from eigenshape._errors import InvalidShapeError
 from eigenshape._extras import import_extra
 from eigenshape._workers import Item, Workers, run_in_workers
@@ -34,7 +34,6 @@ from eigenshape.geometry.conversion import ShapeLike, as_mesh, as_shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.operators.catalog import build_laplacian
-from eigenshape.spectral.cache import require_writable
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.tools.vertex_gradient import (
     Shape3,

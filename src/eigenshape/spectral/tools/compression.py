@@ -15,9 +15,9 @@ from certeig.kit.memory import available_memory
 from certeig.kit.progress import Progress, silent
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import Integer
+from eigenshape._vectors import size_one
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.simplices import size_one
 from eigenshape.spectral.tools.connectivity import OTHER, read_faces, write_faces
 from eigenshape.spectral.tools.patch_basis import (
     find_patches,

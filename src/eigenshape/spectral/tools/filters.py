@@ -14,10 +14,10 @@ from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike
 from eigenshape._arrays import point_functions, require_finite_rows
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import size_one
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import enclosed_volume
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.simplices import size_one
 from eigenshape.geometry.topology import is_closed
 from eigenshape.spectral.spectrum import Spectrum
 

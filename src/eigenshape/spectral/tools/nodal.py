@@ -7,10 +7,9 @@ from certeig.kit.arguments import require_type
 from certeig.kit.arrays import ReadOnly, record
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike
-from eigenshape._arrays import vertex_values
+from eigenshape._arrays import label_components, vertex_values
 from eigenshape.calculus.level_sets import LevelSet, level_set
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
-from eigenshape.geometry.facet_lists import label_components
 from eigenshape.operators.graph import edge_graph
 from eigenshape.spectral.spectrum import Spectrum
 

@@ -8,7 +8,7 @@ from jaxtyping import Float, Int
 from scipy.sparse.csgraph import breadth_first_order, connected_components
 
 from certeig.kit.errors import ConvergenceError
-from eigenshape.geometry.topology import adjacency_matrix
+from eigenshape._arrays import adjacency_matrix
 
 # Most vertices of a patch. A dense basis of 400 takes 0.04 s; with 800 files are 2 % smaller and
 # take four times as long (experiment ch1_compression).

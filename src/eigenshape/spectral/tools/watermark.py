@@ -15,9 +15,9 @@ from certeig.kit.errors import InvalidParameterError
 from certeig.kit.text import html_repr
 from certeig.kit.typing import Integer
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import size_one
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.simplices import size_one
 from eigenshape.geometry.topology import vertex_components
 from eigenshape.operators.robust import robust_laplacian
 from eigenshape.spectral.solve import solve_spectrum

@@ -6,6 +6,7 @@ export type Vec3 = [number, number, number];
 export type Handle =
   | { type: "rotation"; pivot: Vec3; axis: Vec3; angle: number }
   | { type: "translation"; vector: Vec3 }
+  | { type: "scaling"; pivot: Vec3; factors: Vec3 }
   | null;
 
 /** Work of the server that the page waits for. */

@@ -62,6 +62,7 @@ export class Beside {
     first.resize();
     viewer.resize();
     if (!viewer.vertices.length) return;
+    viewer.parallel = first.parallel;
     first.fit();
     viewer.fit();
     if (this.similarity) {
@@ -91,6 +92,7 @@ export class Beside {
     const [from, to] = [views[side], views[1 - side]!];
     const link = side === 0 ? this.link : this.link.clone().invert();
     this.following = true;
+    to.parallel = from.parallel;
     to.camera.position.copy(from.camera.position).applyMatrix4(link);
     to.controls.target.copy(from.controls.target).applyMatrix4(link);
     to.controls.update();

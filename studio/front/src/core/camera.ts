@@ -5,12 +5,16 @@ import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import type { Vec3 } from "./backend";
 
 const FIELD_OF_VIEW = 26; // degrees: almost parallel, as in the library's pictures
-const TANGENT = Math.tan((FIELD_OF_VIEW * Math.PI) / 360);
+// Degrees: from so far away, lines of sight are parallel to a quarter of a pixel. With one kind of
+// camera all that turns, picks and drags is the same.
+const PARALLEL = 0.1;
+const AROUND = 2; // from the origin to the end of what is seen, of the extent
+const NEAREST = 0.01;
 const STEP = 40; // pixels by which a key moves the shape
 const MARGIN = 0.84; // share of the window that the shape fills
 
 export class Eye {
-  readonly camera = new three.PerspectiveCamera(FIELD_OF_VIEW, 1, 0.01, 100);
+  readonly camera = new three.PerspectiveCamera(FIELD_OF_VIEW);
   controls: OrbitControls;
   private up: Vec3 = [0, 1, 0];
   private towards: Vec3 = [0, 0, 1]; // from the shape to the viewer
@@ -43,9 +47,39 @@ export class Eye {
   private startControls(): OrbitControls {
     const controls = new OrbitControls(this.camera, this.canvas);
     controls.zoomToCursor = true;
-    controls.addEventListener("change", this.onMove);
+    controls.addEventListener("change", () => this.moved());
     controls.addEventListener("end", this.onEnd);
     return controls;
+  }
+
+  /** Let the range of depths be that of the scene: from far away there would be too few of them. */
+  private moved(): void {
+    const { camera } = this;
+    const away = camera.position.length();
+    camera.near = Math.max(away - AROUND, NEAREST);
+    camera.far = away + AROUND;
+    camera.updateProjectionMatrix();
+    this.onMove();
+  }
+
+  /** Whether the lines of sight are parallel, as in a drawing; else they meet in the eye. */
+  get parallel(): boolean {
+    return this.camera.fov === PARALLEL;
+  }
+
+  /** At the point about which the camera turns, lengths keep their size. */
+  set parallel(parallel: boolean) {
+    if (parallel === this.parallel) return;
+    const { target } = this.controls;
+    const before = this.tangent;
+    this.camera.fov = parallel ? PARALLEL : FIELD_OF_VIEW;
+    this.camera.position.sub(target).multiplyScalar(before / this.tangent).add(target);
+    this.controls.update();
+  }
+
+  /** Of half the angle from the lower to the upper end of the picture. */
+  private get tangent(): number {
+    return Math.tan((this.camera.fov * Math.PI) / 360);
   }
 
   /** Take the size of the canvas, of which the lowest pixels are covered: pictures fit above them. */
@@ -68,9 +102,9 @@ export class Eye {
     this.controls.update();
   }
 
-  /** Show all vertices upright, from the front; `world` brings them into the scene. */
-  fit(vertices: Float32Array, world: three.Matrix4): void {
-    const towards = new three.Vector3(...this.towards);
+  /** Show all vertices upright, from a side; `world` brings them into the scene. */
+  fit(vertices: Float32Array, world: three.Matrix4, side: Vec3 = this.towards): void {
+    const towards = new three.Vector3(...side).normalize();
     const { target, distance } = this.lookAt(vertices, world, towards);
     this.controls.target.copy(target);
     this.camera.position.copy(target).addScaledVector(towards, distance);
@@ -84,7 +118,7 @@ export class Eye {
     const above = towards.clone().cross(right);
     const turn = new three.Matrix4().makeBasis(right, above, towards).transpose();
     turn.multiply(world);
-    const tangent = MARGIN * TANGENT;
+    const tangent = MARGIN * this.tangent;
     const halves = new three.Vector3(tangent * this.camera.aspect, tangent, 0);
     // A vertex (x, y, z), z towards the camera, is in the picture if the camera stands at least
     // x / tan away from it in z, and so on each of the four sides. Opposite sides are balanced.
@@ -102,11 +136,13 @@ export class Eye {
     return { target, distance };
   }
 
-  get view(): { position: Vec3; target: Vec3 } {
-    return { position: this.camera.position.toArray(), target: this.controls.target.toArray() };
+  get view(): { position: Vec3; target: Vec3; parallel: boolean } {
+    const { camera, controls, parallel } = this;
+    return { position: camera.position.toArray(), target: controls.target.toArray(), parallel };
   }
 
-  set view({ position, target }) {
+  set view({ position, target, parallel }) {
+    this.parallel = parallel;
     this.camera.position.set(...position);
     this.controls.target.set(...target);
     this.controls.update();
@@ -114,7 +150,7 @@ export class Eye {
 
   /** Return the height of the scene that is seen at the point about which the camera turns. */
   get height(): number {
-    return 2 * TANGENT * this.camera.position.distanceTo(this.controls.target);
+    return 2 * this.tangent * this.camera.position.distanceTo(this.controls.target);
   }
 
   /** Return the ray through a place of the canvas, in the coordinates of the scene. */

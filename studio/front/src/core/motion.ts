@@ -14,6 +14,7 @@ export function define(material: three.ShaderMaterial, name: string, value: unkn
   material.needsUpdate = true;
 }
 
+const KINDS = { rotation: 1, translation: 2, scaling: 3 }; // as in moved.glsl; 0: at rest
 const vectors = () => Array.from({ length: MAX_REGIONS }, () => new three.Vector3());
 
 export class Motion {
@@ -29,12 +30,14 @@ export class Motion {
   set(handles: Handle[]): void {
     this.n_moving.value = handles.some((handle) => handle) ? handles.length : 0;
     handles.forEach((handle, region) => {
-      this.kind.value[region] = handle ? (handle.type === "rotation" ? 1 : 2) : 0;
+      const [pivot, direction] = [this.pivot.value[region]!, this.direction.value[region]!];
+      this.kind.value[region] = handle ? KINDS[handle.type] : 0;
+      if (handle && handle.type !== "translation") pivot.set(...handle.pivot);
       if (handle?.type === "rotation") {
-        this.pivot.value[region]!.set(...handle.pivot);
-        this.direction.value[region]!.set(...handle.axis);
+        direction.set(...handle.axis);
         this.angle.value[region] = handle.angle;
-      } else if (handle) this.direction.value[region]!.set(...handle.vector);
+      } else if (handle?.type === "translation") direction.set(...handle.vector);
+      else if (handle) direction.set(...handle.factors).subScalar(1);
     });
     this.blend.value = 0;
     // A shape at rest is drawn without what only a motion needs.

@@ -7,7 +7,7 @@ import { Eye } from "./camera";
 import { buildLegend, formatNumber, rgbOf, type Scale } from "./colors";
 import { h, nextFrame } from "./dom";
 import { Edges } from "./edges";
-import { Motion } from "./motion";
+import { define, Motion } from "./motion";
 import { Picker, type Hit } from "./picking";
 import { Pointer, type Click, type PointerTool } from "./pointer";
 import { startRenderer } from "./renderer";
@@ -23,6 +23,7 @@ export interface View {
   shape: number;
   position: Vec3;
   target: Vec3;
+  parallel: boolean;
 }
 export type { Hit, Click, PointerTool };
 /** What colors a shape; a second picture may take it over. */
@@ -52,9 +53,15 @@ export class Viewer {
   readonly edges = new Edges(this.surface, this.motion);
   readonly onDraw: (() => void)[] = [];
   private readonly skeleton = new Surface(this.motion, "#3f7fae");
+  private readonly disc = { size: { value: DISC }, picture: this.surface.material.uniforms.picture! };
   private readonly discs = new three.Points(
     new three.BufferGeometry(),
-    this.motion.material(pointVertex, pointFragment, { size: { value: DISC } }),
+    this.motion.material(pointVertex, pointFragment, this.disc),
+  );
+  /** The same discs where something hides them: as rings. */
+  private readonly rings = new three.Points(
+    this.discs.geometry,
+    this.motion.material(pointVertex, pointFragment, this.disc),
   );
   private readonly renderer: three.WebGLRenderer | null = null;
   private readonly inSoftware: boolean = false;
@@ -78,18 +85,21 @@ export class Viewer {
   covered = 0; // pixels, from below
 
   constructor(readonly stage: HTMLElement) {
-    const { canvas, surface, skeleton, discs } = this;
+    const { canvas, surface, skeleton, rings, discs } = this;
     stage.append(canvas, h("div", { class: "cross" }), this.tip);
     canvas.setAttribute(
       "aria-label",
       "The shape. Arrow keys turn it, with Ctrl they move it, + and - zoom, Space clicks in the middle.",
     );
-    skeleton.visible = discs.visible = false;
-    skeleton.material.transparent = discs.material.transparent = true;
+    skeleton.visible = discs.visible = rings.visible = false;
+    for (const { material } of [skeleton, discs, rings]) material.transparent = true;
+    define(rings.material, "HOLLOW", 1);
+    Object.assign(rings.material, { depthFunc: three.GreaterDepth, depthWrite: false });
     // The skeleton is drawn over the veil of the surface, also where it lies behind it.
-    [surface, skeleton, discs, this.edges].forEach((object, order) => (object.renderOrder = order));
-    discs.frustumCulled = false;
-    this.space.add(surface, skeleton, discs, this.edges);
+    const drawn = [surface, skeleton, rings, discs, this.edges];
+    drawn.forEach((object, order) => (object.renderOrder = order));
+    discs.frustumCulled = rings.frustumCulled = false;
+    this.space.add(...drawn);
     this.scene.add(this.space);
     const started = startRenderer(canvas, stage, () => this.invalidate());
     if (started) {
@@ -308,9 +318,9 @@ export class Viewer {
     this.invalidate();
   }
 
-  /** Mark vertices by discs of constant size on the screen, of one color or one each. */
+  /** Mark vertices by discs of constant size on the screen, or rings behind the shape; of one color or one each. */
   setPoints(vertices: ArrayLike<number>, colors: string | Uint8Array): void {
-    this.discs.visible = vertices.length > 0;
+    this.discs.visible = this.rings.visible = vertices.length > 0;
     this.surface.shareBuffers(this.discs.geometry, Uint32Array.from(vertices));
     const tints = new Uint8Array(this.vertices.length);
     Array.from(vertices).forEach((vertex, i) => {
@@ -378,9 +388,18 @@ export class Viewer {
     this.pointer.set(cursor, click, tool);
   }
 
-  /** Show the whole shape upright, from the side that the library chose. */
-  fit(): void {
-    this.eye.fit(this.vertices, this.space.matrixWorld);
+  /** Show the whole shape upright, from a side; that which the library chose unless one is given. */
+  fit(side?: Vec3): void {
+    this.eye.fit(this.vertices, this.space.matrixWorld, side);
+  }
+
+  /** Whether the picture is orthographic, or in perspective. */
+  get parallel(): boolean {
+    return this.eye.parallel;
+  }
+  set parallel(parallel: boolean) {
+    this.eye.parallel = parallel;
+    this.onView({ shape: this.shape, ...this.eye.view });
   }
 
   /** Give all clicks on the shape to one taker, before any tool; null ends that. */
@@ -454,7 +473,7 @@ export class Viewer {
     if (!renderer || !this.vertices.length) return;
     const ratio = fine ? FINE : 1;
     if (renderer.getPixelRatio() !== ratio) renderer.setPixelRatio(ratio);
-    this.discs.material.uniforms.size!.value = DISC * ratio;
+    this.disc.size.value = DISC * ratio;
     this.surface.material.uniforms.line!.value = ratio;
     renderer.render(this.scene, this.camera);
     for (const act of this.onDraw) act();

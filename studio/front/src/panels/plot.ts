@@ -3,6 +3,7 @@
 import uPlot from "uplot";
 
 const MARGIN = 0.04; // of the range along x, so that points at its ends are seen whole
+const TICKS = 14; // pixels of them, and of the gap before the numbers
 const FONT = "12px system-ui, sans-serif";
 type Place = [number, number];
 
@@ -58,7 +59,7 @@ export function buildPlot(host: HTMLElement, data: uPlot.AlignedData, options: P
     cursor: { drag: { x: false, y: false }, points: { show: false } },
     axes: [
       { ...style, label: options.labels[0], size: 28 },
-      { ...style, label: options.labels[1], size: 44 },
+      { ...style, label: options.labels[1], size: widthOf },
     ],
     series: [{}, ...options.series],
     hooks: { draw: [(plot) => options.draw(new Pen(plot))] },
@@ -71,6 +72,13 @@ export function buildPlot(host: HTMLElement, data: uPlot.AlignedData, options: P
   const repaint = new MutationObserver(() => plot.redraw(false));
   repaint.observe(page, { attributeFilter: ["data-theme"] });
   return plot;
+}
+
+/** Return the width of an axis on which the longest of its numbers is seen whole. */
+function widthOf(plot: uPlot, numbers: string[] | null): number {
+  plot.ctx.font = FONT;
+  const widths = (numbers ?? []).map((text) => plot.ctx.measureText(text).width);
+  return TICKS + Math.ceil(Math.max(0, ...widths));
 }
 
 /** A series of dots in the color of the page. */

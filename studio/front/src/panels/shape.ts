@@ -3,6 +3,7 @@
 import type { App } from "../contract";
 import type { State, Vec3 } from "../core/backend";
 import { Vector3 } from "three";
+import { nearestAxis } from "../core/axes";
 import { download, Form, h } from "../core/dom";
 import { ColoringPanel } from "./coloring";
 import markup from "./shape.html?raw";
@@ -11,10 +12,8 @@ const NEAR = 0.95; // cosine of the angle to an axis below which a direction is 
 
 /** Return the axis of the coordinates that is near to a direction, or the direction. */
 function snap(direction: Vector3): Vector3 {
-  const axes = [0, 1, 2].flatMap((axis) =>
-    [1, -1].map((sign) => new Vector3().setComponent(axis, sign)),
-  );
-  return axes.find((axis) => axis.dot(direction) > NEAR) ?? direction;
+  const axis = nearestAxis(direction);
+  return axis.dot(direction) > NEAR ? axis : direction;
 }
 
 export class ShapePanel extends ColoringPanel {

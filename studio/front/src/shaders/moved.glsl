@@ -7,9 +7,9 @@ in vec4 shares;
 in vec3 exact;
 in vec3 exact_normal;
 uniform int n_moving;            // regions beyond are at rest
-uniform int kind[REGIONS];       // 0: at rest, 1: rotation, 2: translation
+uniform int kind[REGIONS];       // 0: at rest, 1: rotation, 2: translation, 3: scaling
 uniform vec3 pivot[REGIONS];
-uniform vec3 direction[REGIONS]; // unit axis, or the vector of the translation
+uniform vec3 direction[REGIONS]; // unit axis, vector of the translation, or factors less 1
 uniform float angle[REGIONS];
 uniform float blend;
 
@@ -40,6 +40,8 @@ vec3 moved(out vec3 turn) {
       turn += shares[r] * angle[r] * direction[r];
     } else if (kind[r] == 2) {
       place += shares[r] * direction[r];
+    } else if (kind[r] == 3) {
+      place += shares[r] * direction[r] * (position - pivot[r]);
     }
   }
   return mix(place, exact, blend);

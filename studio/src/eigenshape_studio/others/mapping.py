@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import eigenshape as es
-from eigenshape.geometry.measure import nearest_rotations
+from eigenshape._vectors import nearest_rotations
 from eigenshape.matching.spectral_refinement import lowest_modes, modes_of_part, refine_places
 from eigenshape_studio.others.search import color_places
 from eigenshape_studio.shape.jobs import Progress

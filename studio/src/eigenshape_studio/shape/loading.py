@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 import eigenshape as es
-from eigenshape.geometry.repairs.masks import hemisphere_of
 from eigenshape.io.formats.registry import SHAPE_FORMATS, UPRIGHT, suffix_of
+from eigenshape.io.hemispheres import hemisphere_of
 from eigenshape.plot.camera import Up, View
 from eigenshape_studio.shape.parse import SEAMS, attributes_in, points_in
 from eigenshape_studio.shape.sides import recall_side

@@ -249,9 +249,11 @@ def handle_from(entry: Any) -> es.types.Handle:
             return es.Rotation(entry["pivot"], entry["axis"], entry["angle"])
         if entry["type"] == "translation":
             return es.Translation(entry["vector"])
+        if entry["type"] == "scaling":
+            return es.deformation.Scaling(entry["pivot"], entry["factors"])
     except (KeyError, TypeError) as err:
         raise RequestError(f"A handle must have all its entries; {err} is missing.") from err
-    raise RequestError("The type of a handle must be rotation or translation.")
+    raise RequestError("The type of a handle must be rotation, translation or scaling.")
 
 
 def _n_modes(meta: Meta) -> int | None:

@@ -13,7 +13,6 @@ import numpy as np
 from certeig.kit.errors import FileFormatError
 from eigenshape.features.parcellation import Parcellation
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.repairs.masks import hemisphere_of
 from eigenshape.io.formats.neuro.shared import (
     NO_PARCEL,
     Arrays,
@@ -24,6 +23,7 @@ from eigenshape.io.formats.neuro.shared import (
     require_nibabel,
 )
 from eigenshape.io.formats.numbers import require_reasonable
+from eigenshape.io.hemispheres import hemisphere_of
 
 PREFIX = "CIFTI_STRUCTURE_"
 NIFTI_HEADER = 540  # bytes

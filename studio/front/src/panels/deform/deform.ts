@@ -6,6 +6,7 @@ import { Form, h } from "../../core/dom";
 import type { MotionKind } from "../../core/tools";
 import markup from "./deform.html?raw";
 import { replayFile, transferToFile } from "./files";
+import { Grab, GRABS } from "./grab";
 import { Limbs } from "./limbs";
 import { Motion } from "./motion";
 import { Selection, type Selector } from "./selection";
@@ -31,6 +32,7 @@ export class DeformPanel implements Panel {
   private selection!: Selection;
   private motion!: Motion;
   limbs!: Limbs;
+  private grab!: Grab;
   private tool: Tool = "limb";
   private pose = "";
   private active = false;
@@ -50,7 +52,8 @@ export class DeformPanel implements Panel {
       bound: () => this.showTools(),
       chooseRegion: (region) => this.chooseRegion(region),
     });
-    this.limbs = new Limbs(app, this.motion, this.selection);
+    this.limbs = new Limbs(app, form, this.motion, this.selection);
+    this.grab = new Grab(app);
     const more = form.get<HTMLDetailsElement>("more");
     more.open = app.settings.get("more", false);
     more.addEventListener("toggle", () => app.settings.set("more", more.open));
@@ -71,9 +74,15 @@ export class DeformPanel implements Panel {
     });
     app.addExports(form, "export");
     for (const [tool, { dataset, textContent }] of form.choice("tool"))
-      app.shortcut(dataset.key!, `Bend: ${textContent!.toLowerCase()}`, () => {
+      if (dataset.key)
+        app.shortcut(dataset.key, `Bend: ${textContent!.toLowerCase()}`, () => {
+          app.open(this.id);
+          this.chooseTool(tool as Tool);
+        });
+    for (const [key, kind] of GRABS)
+      app.shortcut(key, `Bend: ${kind} it with the pointer, X Y Z along an axis`, () => {
         app.open(this.id);
-        this.chooseTool(tool as Tool);
+        this.grab.begin(kind, this.tool === "limb" ? this.limbs : this.motion);
       });
     app.shortcut("N", "Bend: light the next limb", () => this.useLimbs(() => this.limbs.next()));
     for (const [key, axis, sign] of SWINGS)
@@ -81,7 +90,10 @@ export class DeformPanel implements Panel {
         this.useLimbs(() => this.limbs.swing(axis, sign)),
       );
     app.shortcut("Enter", "Apply the motions", () => this.motion.commit());
-    app.shortcut("Escape", "Drop the motion", () => this.motion.drop());
+    app.shortcut("Escape", "Drop the motion, let the limbs go", () => {
+      this.motion.drop();
+      this.limbs.letGo();
+    });
     return form.root;
   }
 
@@ -122,7 +134,8 @@ export class DeformPanel implements Panel {
 
   hidden(): void {
     this.active = false;
-    this.limbs.light(-1);
+    this.grab.finish(false);
+    this.limbs.letGo();
     this.app.viewer.setPointer();
     this.app.second?.viewer.setPointer();
     this.motion.drop();
@@ -152,7 +165,7 @@ export class DeformPanel implements Panel {
     const fromLimbs = this.tool === "limb";
     this.tool = tool;
     this.app.settings.set("tool", tool);
-    this.limbs.light(-1);
+    this.limbs.letGo();
     if (tool !== "limb") this.form.get<HTMLDetailsElement>("more").open = true;
     this.showTools();
     this.selection.paint();

@@ -3,17 +3,18 @@
 import type { App } from "../../contract";
 import type { Change, Handle, Vec3 } from "../../core/backend";
 import { buildCoordinate, h, nextFrame, writeCoordinate, type Form } from "../../core/dom";
-import { FIXED } from "../../core/regions";
+import { FIXED, MAX_REGIONS } from "../../core/regions";
 import { MotionTool, type MotionKind } from "../../core/tools";
 import type { Selection } from "./selection";
 
 const REST = 80; // ms without motion, beside two frames, after which the exact result is requested
 const AXES = [0, 1, 2];
+const ROWS = [...Array(MAX_REGIONS).keys()];
 
 export class Motion {
   readonly mover: MotionTool;
   private rows: number[] = []; // the region of each row of the shares
-  private limb: Uint32Array | null = null; // that is bound instead of the regions, as region 0
+  private byLimbs = false; // whether limbs are bound instead of the regions
   private handles: Handle[] = []; // of each region
   private rims: Vec3[] = []; // middle of the rim of each region
   private pivots: (Vec3 | undefined)[] = []; // that the person chose instead
@@ -29,7 +30,7 @@ export class Motion {
     this.mover = new MotionTool(app.viewer, {
       canDrag: (vertex) => this.canDrag(vertex),
       moved: (handle) => this.moved(handle),
-      released: () => this.several || this.commit(),
+      released: () => this.release(),
       pivoted: (pivot) => {
         this.pivots[this.selection.region] = pivot;
         this.writePivot();
@@ -57,12 +58,12 @@ export class Motion {
 
   startPose(): void {
     this.handles = [];
-    this.limb = null;
+    this.byLimbs = false;
   }
 
   /** The number of the region that moves. */
   private get region(): number {
-    return this.limb ? 0 : this.selection.region;
+    return this.byLimbs ? 0 : this.selection.region;
   }
 
   forgetPivot(): void {
@@ -103,19 +104,16 @@ export class Motion {
   }
 
   /** Ask by how much each vertex follows each region; then the regions can be moved. */
-  async bind(limb: Uint32Array | null = null): Promise<void> {
+  async bind(limbs: Uint32Array[] | null = null): Promise<void> {
     const { app, form } = this;
     const { regions } = this.selection;
     const turn = ++this.bindings;
-    const none = new Uint32Array(0);
-    const chosen = limb
-      ? [limb, none, none, none]
-      : [0, 1, 2, 3].map((region) => regions.vertices(region));
-    const fixed = limb ? none : regions.vertices(FIXED);
-    this.limb = limb;
+    const chosen = limbs ?? ROWS.map((region) => regions.vertices(region));
+    const fixed = limbs ? new Uint32Array(0) : regions.vertices(FIXED);
+    this.byLimbs = limbs !== null;
     this.ready = false;
     form.text("bound", "");
-    this.rows = [0, 1, 2, 3].filter((region) => chosen[region]!.length);
+    this.rows = ROWS.filter((region) => chosen[region]?.length);
     if (this.rows.length && app.state.deformation.status === "ready") {
       const request = {
         n_modes: form.number("n-modes") || null,
@@ -136,7 +134,7 @@ export class Motion {
   }
 
   pivotOf(region: number): Vec3 {
-    return this.pivots[region] ?? this.rims[region]!;
+    return (!this.byLimbs && this.pivots[region]) || this.rims[region]!;
   }
 
   private writePivot(): void {
@@ -170,10 +168,15 @@ export class Motion {
     return { kind, handles: this.rowHandles(), mode: this.form.get("mode").value, n_modes };
   }
 
-  /** Show a motion by shares at once, and the exact result when the pointer rests. */
-  async moved(handle: Handle): Promise<void> {
-    const { app } = this;
+  moved(handle: Handle): Promise<void> {
     this.handles[this.region] = handle;
+    return this.moveAll(this.handles);
+  }
+
+  /** Show motions by shares at once, and the exact result when the pointer rests. */
+  async moveAll(handles: Handle[]): Promise<void> {
+    const { app } = this;
+    this.handles = handles;
     app.viewer.setHandles(this.rowHandles());
     const turn = ++this.motions;
     // A slow frame is no rest: a pointer that moves is heard of at the latest before the next one.
@@ -196,6 +199,19 @@ export class Motion {
         this.pivots[region] = pivot.map((value, axis) => value + handle.vector[axis]!) as Vec3;
     });
     if (!(await this.app.change(this.change("commit"), "Bending the shape"))) this.drop();
+  }
+
+  /** Return the pivot of the chosen region, if it can be moved. */
+  async grab(): Promise<Vec3 | null> {
+    const { missing, region } = this;
+    if (missing) this.app.say(missing);
+    else if (!this.ready) await this.bind();
+    return this.ready && this.rows.includes(region) ? this.pivotOf(region) : null;
+  }
+
+  /** What the pointer has moved is an edit, unless other regions shall move with it. */
+  release(): void {
+    if (!this.several) this.commit();
   }
 
   private endMotion(): void {

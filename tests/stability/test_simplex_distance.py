@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from eigenshape.geometry.distances.closest import squared_distances
+from eigenshape.stability.anchors import squared_distances
 
 TRIANGLE = np.array([[[0.0, 0, 0], [2, 0, 0], [0, 2, 0]]])
 

@@ -1,17 +1,17 @@
-"""What `info` and `repair` print about a shape: its size, its topology and its faults."""
+"""The size, topology and faults of a shape, in numbers."""
 
 from typing import Any
 
 import numpy as np
 
 from eigenshape._errors import InvalidShapeError
-from eigenshape.cli.console import err
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.face_turns import inconsistent_edges
 from eigenshape.geometry.measure import bounding_box, edge_lengths, enclosed_volume, surface_area
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair import suggest_repairs
 from eigenshape.geometry.repairs.repair_steps import drop_duplicate_points
+from eigenshape.geometry.samples.spacing import neighbor_distance
 from eigenshape.geometry.seams import seams
 from eigenshape.geometry.simplices import degenerate_simplices, mean_side_length, simplex_volumes
 from eigenshape.geometry.simplicial import SimplicialMesh
@@ -26,7 +26,6 @@ from eigenshape.geometry.topology import (
     unreferenced_vertices,
     vertex_components,
 )
-from eigenshape.operators.clouds.kernel import neighbor_distance
 
 KINDS = {1: "curve", 2: "surface", 3: "tetrahedral mesh"}
 MEASURES = {1: "length", 2: "area"}
@@ -43,16 +42,6 @@ def shape_facts(shape: Shape) -> dict[str, Any]:
     low, high = bounding_box(shape)
     facts |= {"box_low": low.tolist(), "box_high": high.tolist()}
     return facts | {"repairs_to_try": list(suggest_repairs(shape))}
-
-
-def note_seams(shape: Shape) -> None:
-    """Print on stderr that a mesh is open along seams."""
-    n_seams = 0 if isinstance(shape, PointCloud) else len(seams(shape))
-    if n_seams:
-        err.print(
-            f"[yellow]note:[/] this shape is open along seams ({n_seams} sides), which no heat "
-            "crosses; --repair weld_seams closes them"
-        )
 
 
 def _cloud_facts(cloud: PointCloud) -> dict[str, Any]:
