@@ -16,7 +16,7 @@ from scipy.special import expit
 from certeig.kit.arrays import record
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.threads import map_in_threads
-from eigenshape.geometry.facet_lists import label_components
+from eigenshape._arrays import label_components
 from eigenshape.geometry.measure import edge_lengths, face_areas, surface_area
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import dual_volumes
