@@ -89,7 +89,7 @@ def figure_match(
     left, right = figure.subplots(1, 2)
     colors = place_colors(whole.vertices)
     sure = match.confidence[:, None]
-    pulled = sure * match.pull(colors) + (1 - sure) * GRAY
+    pulled = np.where(match.mapped[:, None], sure * match.pull(colors) + (1 - sure) * GRAY, GRAY)
     camera = aim_camera(part, view=view, up=up)
     turned = Camera(camera.rotation @ _rotation_of_map(part, whole, match).T, camera.size)
     show(left, draw(part, camera, vertex_colors=pulled))
@@ -104,7 +104,7 @@ def _rotation_of_map(
 ) -> Float[np.ndarray, "3 3"]:
     """Return the rotation that takes the part best to where the map sends it (Kabsch 1976)."""
     points, _ = scale_to_unit(part)
-    images = match.pull(scale_to_unit(whole)[0])
+    images = np.nan_to_num(match.pull(scale_to_unit(whole)[0]))
     weights = (match.confidence * dual_volumes(part))[:, None]
     weights = weights / (weights.sum() or 1.0)
     arms = points - (weights * points).sum(axis=0)
