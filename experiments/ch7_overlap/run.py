@@ -116,13 +116,18 @@ def main() -> None:
     parser.add_argument(
         "--db", type=output_folder, default="ch7-overlap", help="folder of what is done, kept"
     )
+    parser.add_argument("--sample", type=int, help="number of pairs that are drawn; by default all")
     arguments = parser.parse_args()
     if not arguments.quick:
         require_data()
     half = arguments.half
     pairs = QUICK if arguments.quick else list_pairs(half)
+    # Pairs in any order, so that the first few are a sample of all
+    order = np.random.default_rng(0).permutation(len(pairs))[: arguments.sample]
+    pairs = [pairs[number] for number in order]
     rows = [(one, kept(arguments.db, one, half)) for one in track(pairs, half)]
-    overlaps = dict.fromkeys(overlap for _, overlap, _ in pairs)
+    drawn = {overlap for _, overlap, _ in pairs}
+    overlaps = [overlap for overlap in (*OVERLAPS, DISJOINT, STRANGER) if overlap in drawn]
     results = {
         str(overlap): summarize([row for one, row in rows if one[1] == overlap])
         for overlap in overlaps

@@ -72,11 +72,54 @@ def test_shapes_without_a_common_region_have_no_map():
     assert "no region" in found.report[-1]
 
 
-def test_part_that_is_too_coarse_has_no_map():
+@pytest.fixture(scope="module")
+def tetrahedron():
     corners = np.eye(4)[:, 1:] - 0.25
-    tetrahedron = es.TriangleMesh(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
-    found = es.match_shapes(tetrahedron, CREATURE, overlap="partial")
+    return es.TriangleMesh(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+
+
+@pytest.fixture(scope="module")
+def nothing(tetrahedron):
+    return es.match_shapes(tetrahedron, CREATURE, overlap="partial", mirrored=True)
+
+
+def test_part_that_is_too_coarse_has_no_map(nothing):
+    assert not nothing.mapped.any()
+    assert nothing.mirrored
+
+
+def test_part_of_a_map_gives_no_pose(tetrahedron, nothing):
+    with pytest.raises(InvalidParameterError, match="it leaves out 4 vertices, first 0"):
+        es.matching.take_pose(tetrahedron, CREATURE, match=nothing)
+
+
+@pytest.mark.long
+def test_parts_that_share_nothing_have_no_map():
+    middle = np.quantile(HEIGHTS, 0.5)
+    (one, _), (two, _) = cut(middle > HEIGHTS), cut(middle < HEIGHTS)
+    found = es.match_shapes(one, two, overlap="partial")
     assert not found.mapped.any()
+
+
+@pytest.mark.long
+def test_confidence_in_an_overlap_is_high_where_it_is_right(halves):
+    _, ours, _, theirs, found = halves
+    inside = found.mapped
+    away = np.linalg.norm(
+        CREATURE.vertices[theirs[found.vertices[inside]]] - CREATURE.vertices[ours[inside]], axis=1
+    )
+    right = away < 0.05 * np.sqrt(es.geometry.surface_area(CREATURE))
+    assert abs(found.confidence[inside].mean() - right.mean()) < 0.15
+    assert found.n_equally_good == 1
+
+
+@pytest.mark.long
+def test_mirror_image_of_a_part_is_mapped_on_request(halves):
+    one, _, two, _, found = halves
+    image = es.TriangleMesh(one.vertices * [1, -1, 1], one.faces[:, ::-1])
+    other = es.match_shapes(image, two, overlap="partial", mirrored=True)
+    assert other.mirrored
+    assert (other.mapped == found.mapped).mean() > 0.9
 
 
 def test_overlap_must_be_full_or_partial():

@@ -6,12 +6,14 @@ it takes in what then lies on the other part, and drops what changes its distanc
 part draws nothing and takes nothing in (compare Turk and Levoy 1994 for scans of rigid shapes).
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.spatial import cKDTree
 from scipy.special import expit
+from scipy.stats import rankdata
 
 from certeig.kit.arrays import record
 from certeig.kit.errors import InvalidParameterError
@@ -69,14 +71,18 @@ SMALL_PIECE = 0.1  # pieces of a region with a smaller share of the largest one 
 LEAST_DIFFERENCE = 1.0  # of patches; that of copies is 0
 # The part is stiffer than one that lies on the whole in whole: fewer features keep it from sliding.
 STIFFNESSES = tuple(3 * each for each in STIFFNESS)
-# How good a region is: weights of the logarithm of its share of the part, of the median change of
-# distances, and of the mean logarithm of differences of patches. Of the tuning half, the best regions
-# of four pairs that overlap have -3.5 to -4.5, and the best of three that do not -4.5 to -4.8.
-WEIGHTS = np.array([0.5, -30, -1])
-LEAST_WORTH = -4.4
+# A region ends where one of the parts ends: this near to a boundary, in units, or in mean edges. What
+# ends within both parts is not explained; a shorter length than this share of the root of the area says little.
+ENDS, ENDS_IN_EDGES, SHORT = 0.06, 2.0, 0.2
+# Log odds that a region is right: a constant, and weights of the median change of distances, of the
+# logarithm of how many points have patches that are more alike, and of how much of its end is explained.
+WORTH = np.array([-7.5, -29.0, -1.83, 6.6])
+LEAST_RANK = 1e-3
+LEAST_WORTH = -0.5
+ABOUT_AS_GOOD = np.log(2)  # a rival is as good if its odds are half of the best ones
 # Logistic regression on vertices of regions of the tuning half: a constant, change of distances, gap,
 # and how good the region is
-CALIBRATION = np.array([36.0, -25.9, 11.5, 7.98])
+CALIBRATION = np.array([1.52, -5.0, -49.0, 0.69])
 NEARBY = 0.75  # mean edges from an image within which a vertex of the other part is in the region
 
 
@@ -85,7 +91,8 @@ class Region:
     """A part bent so that a region of it lies on another part.
 
     `fit` is that of the vertices of the part, or roughly of its points, which are rows `at` of it.
-    `stretch` is how far distances from there to the region change, as a share.
+    `stretch` is how far distances from there to the region change, as a share. `worth` are the log
+    odds that the region is right.
     """
 
     fit: Fit
@@ -93,6 +100,25 @@ class Region:
     inside: Bool[np.ndarray, " k"]
     stretch: Float[np.ndarray, " k"]
     worth: float
+    area: float
+
+    @property
+    def promise(self) -> float:
+        """The area that can be expected to be right."""
+        return float(expit(self.worth)) * self.area
+
+
+@record
+class Signs:
+    """What tells right regions of two parts from wrong ones.
+
+    `ranks` is the share of points of the other part that are more alike than each one. `ours` and
+    `theirs` tell which vertices of the two parts lie near to a boundary.
+    """
+
+    ranks: Float[np.ndarray, "m k"]
+    ours: Bool[np.ndarray, " n"]
+    theirs: Bool[np.ndarray, " v"]
 
 
 def factor_of_overlap(scale: str | float) -> float:
@@ -112,8 +138,12 @@ def match_overlap(
     other = target.pieces[0]
     whole = other.surface
     part = describe_surface(piece.copy.mesh, other.unit / factor, N_PART)
-    found = find_region(part, whole, patch_differences(part, whole))
+    regions = find_regions(part, whole, patch_differences(part, whole))
+    found = regions[0]
     is_found = found.worth >= LEAST_WORTH
+    # Of several regions one at most is right, or none.
+    rivals = np.array([one.worth for one in regions[1:]])
+    beside_rivals = found.worth - np.logaddexp.reduce(np.append(rivals, 0.0))
 
     # Carry the map of all vertices, and what tells where it holds, to the meshes as they were given.
     fit = found.fit
@@ -127,7 +157,7 @@ def match_overlap(
         weights[inside],
     )
     corners = target.mesh.faces[faces]
-    told = np.column_stack([tells[inside, 1:], np.full(len(mapped), found.worth)])
+    told = np.column_stack([tells[inside, 1:], np.full(len(mapped), beside_rivals)])
     images = np.einsum("nc,ncd->nd", weights, target.mesh.vertices[corners])
     covered = _covered_vertices(mesh, target.mesh, images)
 
@@ -163,7 +193,7 @@ def match_overlap(
         orientation=orientation,
         coverage=coverage,
         handed=True,
-        n_equally_good=1,
+        n_equally_good=1 + int((rivals > found.worth - ABOUT_AS_GOOD).sum()),
         scale=factor,
         report=report,
         covered=covered,
@@ -180,8 +210,13 @@ def _covered_vertices(
     return cKDTree(images).query(whole.vertices)[0] <= NEARBY * edge
 
 
-def find_region(part: Surface, whole: Surface, differences: Float[np.ndarray, "m k"]) -> Region:
-    """Return the best region of a part that lies on another part; its worth is -inf if there is none."""
+def find_regions(
+    part: Surface, whole: Surface, differences: Float[np.ndarray, "m k"]
+) -> list[Region]:
+    """Return different regions of a part that lie on another part, the most promising first.
+
+    The worth of a single one without vertices is -inf.
+    """
     starts: list[Pairs] = []
     if min(len(part.points), len(whole.points)) >= N_FAR:
         starts = window_pairs(part, whole, differences)
@@ -190,25 +225,22 @@ def find_region(part: Surface, whole: Surface, differences: Float[np.ndarray, "m
     inner[boundary_vertices(whole.mesh)] = False
     plan = replace(plan_fit(part, whole), inner=inner)
     rough = replace(plan_rough_fit(part, whole), inner=inner)
+    signs = _signs(part, whole, differences)
 
     def grow_roughly(pairs: Pairs) -> Region:
-        first = _bend(rough, differences, pairs, FIRST_REACH)
-        return _grow(rough, differences, first, N_ROUGH_ROUNDS)
+        first = _bend(rough, signs, pairs, FIRST_REACH)
+        return _grow(rough, signs, first, N_ROUGH_ROUNDS)
 
     grown = [one for one in map_in_threads(grow_roughly, starts) if one.worth > -np.inf]
     # Many starts lead to one map, so only the best of those that agree is grown finely.
-    different: list[Region] = []
-    for one in sorted(grown, key=lambda one: -one.worth):
-        if not any(_agree(whole, one, other) for other in different):
-            different.append(one)
-    best = map_in_threads(
-        lambda one: _grow(plan, differences, one, N_ROUNDS), different[:N_FINISHED]
-    )
-    if best:
-        return max(best, key=lambda one: one.worth)
+    first = _different(whole, grown)[:N_FINISHED]
+    fine = map_in_threads(lambda one: _grow(plan, signs, one, N_ROUNDS), first)
+    fine = [one for one in fine if one.worth > -np.inf]
+    if fine:
+        return _different(whole, fine)
     n = part.mesh.n_vertices
     nowhere = Fit(part.mesh.vertices, np.zeros(n, dtype=np.int64), np.full(n, LARGEST_GAP), 1.0)
-    return Region(nowhere, part.points, np.zeros(n, dtype=bool), np.ones(n), -np.inf)
+    return [Region(nowhere, part.points, np.zeros(n, dtype=bool), np.ones(n), -np.inf, 0.0)]
 
 
 def window_pairs(
@@ -250,6 +282,15 @@ def _unlikeness(
     return float(np.log(np.maximum(differences[points, partners], LEAST_DIFFERENCE)).mean())
 
 
+def _different(whole: Surface, regions: Sequence[Region]) -> list[Region]:
+    """Return regions of which no two place the part alike, the most promising first."""
+    found: list[Region] = []
+    for one in sorted(regions, key=lambda one: -one.promise):
+        if not any(_agree(whole, one, other) for other in found):
+            found.append(one)
+    return found
+
+
 def _agree(whole: Surface, one: Region, other: Region) -> bool:
     """Return whether two rough maps place most of the smaller region alike."""
     both = one.inside & other.inside
@@ -258,20 +299,20 @@ def _agree(whole: Surface, one: Region, other: Region) -> bool:
     return bool(2 * n_alike >= min(one.inside.sum(), other.inside.sum()))
 
 
-def _grow(plan: FitPlan, differences: Float[np.ndarray, "m k"], one: Region, rounds: int) -> Region:
-    """Bend the part anew, round by round, with what is near the region."""
+def _grow(plan: FitPlan, signs: Signs, one: Region, rounds: int) -> Region:
+    """Bend the part anew, round by round, with what is near the region; return the best round."""
+    best = replace(one, worth=-np.inf)
     for _ in range(rounds):
         points = np.flatnonzero(one.inside[one.at])
         if len(points) < FEWEST:
             break
         partners = plan.whole.nearest[one.fit.places[one.at[points]]]
-        one = _bend(plan, differences, Pairs(points, partners, np.ones(len(points))), REACH)
-    return one
+        one = _bend(plan, signs, Pairs(points, partners, np.ones(len(points))), REACH)
+        best = max(best, one, key=lambda each: each.promise)
+    return best
 
 
-def _bend(
-    plan: FitPlan, differences: Float[np.ndarray, "m k"], pairs: Pairs, reach: float
-) -> Region:
+def _bend(plan: FitPlan, signs: Signs, pairs: Pairs, reach: float) -> Region:
     """Bend what is near pairs, and return the region of the part that then lies on the other one."""
     part, whole = plan.part, plan.whole
     # The rest of the part is moved along, but drawn to nothing.
@@ -285,12 +326,13 @@ def _bend(
     is_rough = np.array_equal(plan.compared, part.points)
     at = np.arange(len(lies)) if is_rough else part.points
     stretch = _stretches(plan, fit.places[at], lies[at])
-    points = np.flatnonzero(lies[at] & (stretch < MOST_STRETCH))
-    worth = _worth(plan, differences, fit.places[at], points)
-    if not is_rough:
+    if is_rough:
+        inside = lies & (stretch < MOST_STRETCH)
+    else:
         stretch = stretch[part.nearest]
-    inside = lies & (stretch < MOST_STRETCH)
-    return Region(fit, at, inside if is_rough else _large_pieces(part, inside), stretch, worth)
+        inside = _large_pieces(part, lies & (stretch < MOST_STRETCH))
+    worth, area = _worth(plan, signs, fit.places, at, inside, stretch)
+    return Region(fit, at, inside, stretch, worth, area)
 
 
 def _stretches(
@@ -310,19 +352,50 @@ def _stretches(
 
 def _worth(
     plan: FitPlan,
-    differences: Float[np.ndarray, "m k"],
-    ends: Int[np.ndarray, " m"],
-    points: Int[np.ndarray, " p"],
-) -> float:
-    """Return how good it is that some points of a part lie where they do; -inf if they are too few."""
+    signs: Signs,
+    places: Int[np.ndarray, " k"],
+    at: Int[np.ndarray, " m"],
+    inside: Bool[np.ndarray, " k"],
+    stretch: Float[np.ndarray, " k"],
+) -> tuple[float, float]:
+    """Return the log odds that a region is right, -inf if it has too few points, and its area."""
     part = plan.part
+    points = np.flatnonzero(inside[at])
     if len(points) < FEWEST:
-        return -np.inf
-    cells = np.bincount(part.nearest, weights=part.areas, minlength=len(part.points))
-    inside = np.isin(np.arange(len(ends)), points)
-    stretch = np.median(_stretches(plan, ends, inside)[points])
-    unlike = _unlikeness(differences, points, plan.whole.nearest[ends[points]])
-    return float(np.array([np.log(cells[points].sum() / part.area), stretch, unlike]) @ WEIGHTS)
+        return -np.inf, 0.0
+    ranks = signs.ranks[points, plan.whole.nearest[places[at[points]]]]
+    rank = np.log(np.median(ranks) + LEAST_RANK)
+    if len(places) == len(at):
+        # Each vertex is with its nearest point.
+        places, inside = places[part.nearest], inside[part.nearest]
+    explained = _explained_end(part, signs, places, inside)
+    worth = float(WORTH @ [1, np.median(stretch[at[points]]), rank, explained])
+    return worth, float(part.areas[inside].sum())
+
+
+def _explained_end(
+    part: Surface, signs: Signs, places: Int[np.ndarray, " n"], inside: Bool[np.ndarray, " n"]
+) -> float:
+    """Return for which share of its end a region ends because the other part does."""
+    edges = edge_table(part.mesh).edges
+    crossing = edges[inside[edges].sum(axis=1) == 1].ravel()
+    last = np.unique(crossing[inside[crossing]])
+    last = last[~signs.ours[last]]
+    lengths = np.sqrt(part.areas[last])
+    unexplained = lengths @ ~signs.theirs[places[last]]
+    short = SHORT * np.sqrt(part.areas[inside].sum())
+    return float(1 - unexplained / (lengths.sum() + short))
+
+
+def _signs(part: Surface, whole: Surface, differences: Float[np.ndarray, "m k"]) -> Signs:
+    """Return what tells right regions from wrong ones."""
+    ranks = (rankdata(differences, method="min", axis=1) - 1) / differences.shape[1]
+    meshes = part.mesh, whole.mesh
+    near = max(ENDS, *(ENDS_IN_EDGES * edge_lengths(mesh).mean() for mesh in meshes))
+    # In a straight line; a closed surface has no vertex near to a boundary.
+    trees = [cKDTree(mesh.vertices[boundary_vertices(mesh)]) for mesh in meshes]
+    ends = [tree.query(mesh.vertices)[0] < near for tree, mesh in zip(trees, meshes, strict=True)]
+    return Signs(ranks, *ends)
 
 
 def _large_pieces(part: Surface, inside: Bool[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
