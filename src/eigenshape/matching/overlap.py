@@ -195,7 +195,7 @@ def match_overlap(
         orientation=orientation,
         coverage=coverage,
         handed=True,
-        n_equally_good=n_equally_good,
+        n_equally_good=n_equally_good if is_found else 1,
         scale=factor,
         report=report,
         covered=covered,

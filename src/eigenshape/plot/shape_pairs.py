@@ -94,7 +94,8 @@ def figure_match(
     turned = Camera(camera.rotation @ _rotation_of_map(part, whole, match).T, camera.size)
     show(left, draw(part, camera, vertex_colors=pulled))
     show(right, draw(whole, turned, vertex_colors=colors))
-    left.set_title(f"part: {match.confidence.mean():.0%} sure on average", fontsize=10)
+    average = match.confidence[match.mapped].mean() if match.mapped.any() else 0.0
+    left.set_title(f"part: {average:.0%} sure on average", fontsize=10)
     right.set_title("whole", fontsize=10)
     return figure
 
