@@ -88,7 +88,7 @@ def match(
             ours, theirs, scale=size, mirrored=side_of_part, overlap=overlap, progress=progress
         )
     if as_json:
-        each = {"vertices": found.vertices, "vertex_confidence": found.confidence}
+        each: dict[str, Any] = {"vertices": found.vertices, "vertex_confidence": found.confidence}
         if overlap == "partial":
             each["covered"] = found.covered
         print_json({"path": mesh, "whole": whole, **_match_facts(found), **each})
@@ -102,8 +102,8 @@ def match(
 
 def _match_facts(found: es.matching.ShapeMatch) -> dict[str, Any]:
     """Return what a map says of the whole shape, without what it says of each vertex."""
-    arrays = ("vertices", "faces", "corners", "weights", "confidence", "evidence")
-    arrays += ("covered", "mapped")
+    of_vertices = "vertices", "faces", "corners", "weights", "confidence", "evidence"
+    arrays = (*of_vertices, "covered", "mapped")
     means = {"mean_confidence": found.confidence.mean(), "share_sure": found.sure().mean()}
     return result_facts(found, *arrays) | means
 

@@ -381,7 +381,10 @@ def _stretches(
     changes = np.ma.masked_array(
         np.abs(ours - theirs) / np.maximum(np.maximum(ours, theirs), NEAR), ~known
     )
-    return np.ma.median(changes, axis=0).filled(1.0) if len(points) else np.ones(len(ends))
+    if not len(points):
+        return np.ones(len(ends))
+    medians = np.ma.median(changes, axis=0)  # type: ignore[no-untyped-call]
+    return np.asarray(medians.filled(1.0))
 
 
 def _worth(
