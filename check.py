@@ -4,7 +4,7 @@ python check.py            all of it but the long tests and the studio; four min
 python check.py core       only the files and quick tests of a group of tests/house/groups.toml; two minutes
 python check.py --all      the long tests, the docs site and the studio in a browser, too; twenty minutes
 python check.py --rest     what `python check.py` leaves of `--all`
-python check.py --nightly  as --all, with every part of the broad sweeps; a commit runs a tenth of these
+python check.py --nightly  everything; a commit runs half of the long tests and a tenth of the broad sweeps
 python check.py --fast     without the tests
 python check.py --record   the quick tests alone, and write their CPU seconds into tests/house/budgets.toml
 """
@@ -56,26 +56,26 @@ def main() -> int:
         os.environ.setdefault("OMP_NUM_THREADS", "1")
     with tempfile.TemporaryDirectory() as site:
         if options.group:
-            first, tests, beside = checks_of_group(options.group)
+            first, *chains = checks_of_group(options.group)
         else:
-            first, tests, beside = checks_of_all(options.mode, site)
+            first, *chains = checks_of_all(options.mode, site)
         failed = run_checks(first)
-        # Beside the tests, so that no core waits: types take one, and the studio half of one.
-        with ThreadPoolExecutor(2) as pool:
-            for found in pool.map(run_checks, [tests, beside]):
+        # Side by side, so that no core waits: types take one, and the studio half of one.
+        with ThreadPoolExecutor(len(chains)) as pool:
+            for found in pool.map(run_checks, chains):
                 failed += found
     if not options.group and options.mode != "record":
         print("== readability, for looking and not for enforcing", flush=True)
         subprocess.run([sys.executable, "tests/house/readability.py"], check=True)
         print("== figures that are older than what they time, for looking", flush=True)
         subprocess.run([sys.executable, "benchmarks/figures.py", "--stale"], check=True)
-    names = [*first, *beside, *tests]
+    names = [name for checks in (first, *chains) for name in checks]
     print(f"failed: {', '.join(failed)}" if failed else f"passed: {', '.join(names)}")
     return 1 if failed else 0
 
 
-def checks_of_group(group: str) -> tuple[Checks, Checks, Checks]:
-    """Return the checks of the files of one group, and its quick tests."""
+def checks_of_group(group: str) -> list[Checks]:
+    """Return the checks of the files of one group to begin with, its quick tests, and what runs beside them."""
     sources, tests = GROUPS[group]["sources"], GROUPS[group]["tests"]
     first = {"format": [*FORMAT, *sources, *tests], "lint": [*LINT, *sources, *tests]}
     quick = [*PYTEST, *QUICK, "--group", group, *tests]
@@ -84,32 +84,39 @@ def checks_of_group(group: str) -> tuple[Checks, Checks, Checks]:
     beside: Checks = {"types": [*TYPES, *sources]}
     if group == "certeig":
         beside["tests without shapes"] = CERTEIG
-    return first, {"tests": quick}, beside
+    return [first, {"tests": quick}, beside]
 
 
-def checks_of_all(mode: str | None, site: str) -> tuple[Checks, Checks, Checks]:
-    """Return the checks to begin with, the tests, and what runs beside them; the docs go to the folder `site`."""
+def checks_of_all(mode: str | None, site: str) -> list[Checks]:
+    """Return the checks to begin with, and those that run side by side; the docs go to the folder `site`."""
     if mode == "record":
         # The same seconds on every day: all by one kernel, and no other process.
         quick = [*PYTEST, *QUICK, "--record"]
-        return {}, {"tests": quick, "tests of the studio": [*quick, "studio/tests"]}, {}
+        return [{}, {"tests": quick, "tests of the studio": [*quick, "studio/tests"]}]
     first: Checks = {"format": [*FORMAT, "."], "lint": [*LINT, "."]}
     beside: Checks = {"types": TYPES, "layers": LAYERS}
     if mode == "fast":
-        return first, {}, beside
+        return [first, beside]
     if mode is None:
         beside["certeig"] = CERTEIG
-        return first, {"tests": [*PYTEST, *QUICK, *two_processes()]}, beside
-    sweeps = ["--nightly"] if mode == "nightly" else []
-    turn, turns = (0, 1) if sweeps else (turn_of_commit(), TURNS)
+        return [first, {"tests": [*PYTEST, *QUICK, *two_processes()]}, beside]
+    nightly = mode == "nightly"
+    share = ["--nightly"] if nightly else ["--half"]
+    turn, turns = (0, 1) if nightly else (turn_of_commit(), TURNS)
     beyond: Checks = {
-        "certeig": [*CERTEIG, "--types", "-m", ""],  # all, with the types of arguments checked
+        # With the types of arguments checked; its long tests are the rest of a sweep.
+        "certeig": [*CERTEIG, "--types", *(["-m", ""] if nightly else [])],
         "docs": [*DOCS, *run_gallery(turn, turns), site],
-        "studio": [*PYTEST, *sweeps, "studio/tests"],
     }
+    studio: Checks = {"studio": [*PYTEST, *share, "studio/tests"]}
     if mode == "rest":
-        return {}, {"long tests": [*PYTEST, "-m", "long", *two_processes()]}, beyond
-    return first, {"all tests": [*PYTEST, *sweeps, *two_processes()]}, beside | beyond
+        return [
+            {},
+            {"long tests": [*PYTEST, *share, "-m", "long", *two_processes()]},
+            beyond,
+            studio,
+        ]
+    return [first, {"all tests": [*PYTEST, *share, *two_processes()]}, beside | beyond, studio]
 
 
 def two_processes() -> list[str]:

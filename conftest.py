@@ -11,6 +11,7 @@ from zlib import crc32
 import pytest
 
 ROOT = Path(__file__).resolve().parent
+STUDIO = ROOT / "studio" / "tests"
 sys.path.append(str(ROOT / "tests" / "house"))
 from budgets import SECONDS, read_budgets, write_budgets  # noqa: E402
 from groups import GROUPS, group_of  # noqa: E402
@@ -25,6 +26,11 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group = parser.getgroup("eigenshape")
     group.addoption("--nightly", action="store_true", help="run every part of the broad sweeps")
     group.addoption("--turn", type=int, choices=range(TURNS), help="the part of sweeps to run")
+    group.addoption(
+        "--half",
+        action="store_true",
+        help="of files with long tests, and of those of the studio, the half whose turn it is",
+    )
     group.addoption("--group", choices=GROUPS, help="collect the tests of one group alone")
     group.addoption(
         "--record", action="store_true", help="write the CPU time of groups into budgets.toml"
@@ -72,20 +78,25 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 
 @pytest.hookimpl(trylast=True)  # after other files have marked their tests
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out the tests marked `sweep` that have another turn.
+    """Leave out the tests marked `sweep` that have another turn, and half of the long ones if asked to.
 
     The tests of a file take turns one after the other. Those with the same argument, `sweep("ch5_parts")`, have the
-    same turn, wherever they are.
+    same turn, wherever they are. Long tests of one file share what they make, and are in one half.
     """
     turn = config.stash[TURN]
     if turn is None:
         return
+    waiting = set()
+    if config.getoption("--half"):
+        files = sorted({item.path for item in items if _is_long(item)})
+        # Not by odd and even turns, which decide in `check.py` which BLAS a file has.
+        waiting = set(files[turn // (TURNS // 2) :: 2])
     places: Counter[Path] = Counter()
     kept, left_out = [], []
     for item in items:
         mark = item.get_closest_marker("sweep")
         if mark is None:
-            kept.append(item)
+            (left_out if item.path in waiting and _is_long(item) else kept).append(item)
             continue
         key = mark.args[0] if mark.args else item.path.name
         place = crc32(key.encode()) + (0 if mark.args else places[item.path])
@@ -93,6 +104,10 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         (kept if place % TURNS == turn else left_out).append(item)
     config.hook.pytest_deselected(items=left_out)
     items[:] = kept
+
+
+def _is_long(item: pytest.Item) -> bool:
+    return item.get_closest_marker("long") is not None or STUDIO in item.path.parents
 
 
 @pytest.fixture(scope="session")

@@ -10,6 +10,7 @@ import pytest
 KILLS = Path(__file__).parents[2] / "benchmarks" / "kills.py"
 
 
+@pytest.mark.sweep
 @pytest.mark.long
 @pytest.mark.parametrize("store", ["collection", "index"])
 def test_kills_lose_nothing_and_turned_bits_are_named(store):

@@ -15,7 +15,7 @@ import tomllib
 from collections import Counter
 
 from groups import GROUPS, HOUSE, group_of, modules, private_across_walls, public_names
-from readability import code_tokens, docstring_lines
+from readability import code_tokens
 
 BUDGETS = HOUSE / "budgets.toml"
 WALLS = HOUSE / "private_across_walls.txt"
@@ -45,12 +45,11 @@ def measure() -> dict[str, Row]:
 
 def count_tokens(text: str) -> int:
     """Return the number of tokens of code, without docstrings, comments and imports."""
-    tree = ast.parse(text)
-    left_out = docstring_lines(tree)
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Import | ast.ImportFrom):
-            left_out |= set(range(node.lineno, (node.end_lineno or node.lineno) + 1))
-    return sum(token.start[0] not in left_out for token in code_tokens(text))
+    imports: set[int] = set()
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, (ast.Import, ast.ImportFrom)):
+            imports.update(range(node.lineno, (node.end_lineno or node.lineno) + 1))
+    return sum(token.start[0] not in imports for token in code_tokens(text))
 
 
 def read_budgets() -> dict[str, Row]:

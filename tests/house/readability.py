@@ -50,8 +50,8 @@ def code_tokens(text: str) -> list[tokenize.TokenInfo]:
 def docstring_lines(tree: ast.Module) -> set[int]:
     """Return the lines that docstrings stand on."""
     lines: set[int] = set()
+    documented = ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef
     for node in ast.walk(tree):
-        documented = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
         if isinstance(node, documented) and ast.get_docstring(node):
             first = node.body[0]
             lines |= set(range(first.lineno, (first.end_lineno or first.lineno) + 1))

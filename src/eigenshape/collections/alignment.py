@@ -4,8 +4,7 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 import numpy as np
-from jaxtyping import Float
-from scipy.spatial import cKDTree
+from jaxtyping import Float, Int
 from scipy.spatial.transform import Rotation
 
 from certeig.kit.arrays import ReadOnly, record
@@ -20,6 +19,7 @@ from eigenshape.collections.spread_points import (
 )
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.matching.nearest import RowTree
 
 # Lengths are in units of the root mean square distance of a surface from its middle. All numbers
 # were chosen on the tuning half of experiments/ch7_collection: skulls, whole, and cut by planes.
@@ -35,7 +35,6 @@ N_KEPT, N_REFINED = 126, 10  # of up to 448 starts: after half of the rough roun
 ROUGH_REACH = np.geomspace(0.6, 0.2, 10)
 FINE_REACH = np.geomspace(0.2, 0.05, 40)
 N_EARLY, N_LAST = 10, 3  # fine rounds of all places, and how many of these the later rounds refine
-LEAF = 32  # points in a leaf of the tree: with six coordinates a sixth faster than 16
 ON_SURFACE = 0.1  # distance at which a point counts half in a gap
 # Gap below which the random turns are not tried. On the tuning half of experiments/ch7_collection and
 # for creatures, whole or half, random turns lower a smaller gap by at most 0.015; where they find
@@ -185,7 +184,7 @@ def align_surfaces(
     surface, whole = as_mesh(surface, "surface"), as_mesh(whole, "whole")
     ours, our_middle, our_size = _points_in_own_size(surface, N_POINTS)
     theirs, middle, size = _points_in_own_size(whole, N_WHOLE[0])
-    tree, rough_tree = cKDTree(theirs, LEAF), cKDTree(theirs[:: N_WHOLE[0] // N_WHOLE[1]], LEAF)
+    tree, rough_tree = RowTree(theirs), RowTree(theirs[:: N_WHOLE[0] // N_WHOLE[1]])
 
     def search(points: Float[np.ndarray, "k 6"]) -> _Places:
         """Return the best place of points with normals."""
@@ -257,7 +256,7 @@ def _count_turns_into_itself(mesh: TriangleMesh) -> float:
     random = Rotation.random(N_TURNS, rng=np.random.default_rng(0)).as_matrix()
     turns = np.concatenate([revolving, half_turns, random])
     starts = _Places(np.ones(len(turns)), turns, np.zeros((len(turns), 3)), np.zeros(len(turns)))
-    few, tree = points[:: N_POINTS // N_ROUGH], cKDTree(whole, LEAF)
+    few, tree = points[:: N_POINTS // N_ROUGH], RowTree(whole)
     found = _refine(few, tree, starts, np.append(ROUGH_REACH, FINE_REACH[:N_EARLY]))
     fits = found.gaps < found.gaps.min() / ON_ITSELF
     stays = np.einsum("qij,qij->q", turns, found.rotations) > SAME_TURN
@@ -328,21 +327,22 @@ def _axis_turns(
 
 
 def _refine(
-    points: Float[np.ndarray, "k 6"], tree: cKDTree, places: _Places, reaches: np.ndarray
+    points: Float[np.ndarray, "k 6"], tree: RowTree, places: _Places, reaches: np.ndarray
 ) -> _Places:
     """Move points from each place to their nearest partners, with an ever shorter reach."""
     ours, normals = points[:, :3], points[:, 3:]
     scales, rotations, translations = places.scales, places.rotations, places.translations
+    found = None
 
-    def nearest() -> tuple[Float[np.ndarray, "q k"], Float[np.ndarray, "q k 3"]]:
+    def nearest() -> tuple[Float[np.ndarray, "q k"], Int[np.ndarray, "q k"]]:
         turned = ours @ rotations.transpose(0, 2, 1)
         moved = scales[:, None, None] * turned + translations[:, None]
         facing = normals @ rotations.transpose(0, 2, 1)
-        distances, partners = tree.query(np.concatenate([moved, facing], axis=2))
-        return distances, tree.data[partners, :3]
+        return tree.nearest(np.concatenate([moved, facing], axis=2), found)
 
     for reach in reaches:
-        distances, partners = nearest()
+        distances, found = nearest()
+        partners = tree.rows[found, :3]
         weights = (1 + (distances / reach) ** 2) ** -2
         weights /= weights.sum(axis=1, keepdims=True)
         middles, targets = weights @ ours, np.einsum("qk,qkd->qd", weights, partners)

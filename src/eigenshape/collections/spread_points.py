@@ -2,7 +2,6 @@
 
 import numpy as np
 from jaxtyping import Float
-from scipy.spatial import cKDTree
 
 from certeig.kit.arrays import record
 from eigenshape._errors import InvalidShapeError
@@ -12,6 +11,7 @@ from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.samples.surface_points import SurfacePoints, place_points
 from eigenshape.geometry.topology import vertex_components
+from eigenshape.matching.nearest import RowTree
 
 # Area of the smallest piece that counts, as a share of the largest one: the halves of a broken bone
 # do, crumbs of a scan do not.
@@ -70,12 +70,18 @@ def join_normals(
     return np.concatenate([points, weight * normals], axis=1)
 
 
-def nearest_both_ways(
-    ours: Float[np.ndarray, "k 6"], theirs: Float[np.ndarray, "m 6"], tree: cKDTree
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Pair each point with the nearest one of the other surface: ours, theirs, and the distances."""
-    to_them, nearest = tree.query(ours)
-    to_us, nearest_of_them = cKDTree(ours).query(theirs)
-    first = np.concatenate([np.arange(len(ours)), nearest_of_them])
-    second = np.concatenate([nearest, np.arange(len(theirs))])
-    return first, second, np.concatenate([to_them, to_us])
+class Pairing:
+    """Each point of two surfaces, with the nearest one of the other, while the first one moves."""
+
+    def __init__(self, ours: Float[np.ndarray, "k 6"], theirs: Float[np.ndarray, "m 6"]) -> None:
+        self._ours, self._theirs = RowTree(ours), RowTree(theirs)
+        self._to_them, self._to_us = (np.zeros(len(each), np.int64) for each in (ours, theirs))
+
+    def pair(self, ours: Float[np.ndarray, "k 6"]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return pairs from where our points are now: ours, theirs, and the distances."""
+        self._ours.move(ours)
+        far, self._to_them = self._theirs.nearest(ours, self._to_them)
+        far_from_them, self._to_us = self._ours.nearest(self._theirs.rows, self._to_us)
+        first = np.concatenate([np.arange(len(ours)), self._to_us])
+        second = np.concatenate([self._to_them, np.arange(len(self._to_us))])
+        return first, second, np.concatenate([far, far_from_them])

@@ -8,7 +8,6 @@ from typing import Literal, NamedTuple, TypeAlias
 import numpy as np
 from jaxtyping import Float, Int
 from scipy.linalg import solve
-from scipy.spatial import cKDTree
 
 from certeig.kit.arrays import ReadOnly, record
 from certeig.kit.errors import CerteigError
@@ -23,8 +22,8 @@ from eigenshape.collections.alignment import (
     align_surfaces,
 )
 from eigenshape.collections.spread_points import (
+    Pairing,
     join_normals,
-    nearest_both_ways,
     spread_points,
 )
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -274,16 +273,18 @@ def bend_onto(
         places, theirs = samples[n_points]
         faces, shares = placed.faces[places.simplices], places.weights
         ends, end_normals = (theirs.points - middle) / size, theirs.normals
-        ends_with_normals = join_normals(ends, end_normals, NORMAL_WEIGHT)
-        tree = cKDTree(ends_with_normals)
         points = np.einsum("pc,pcd->pd", shares, vertices[faces])
         # One center in each cell of a grid, at the first of the points in it
         cells = np.floor(points / (SPACING * width)).astype(np.int64)
         centers = points[np.unique(cells, axis=0, return_index=True)[1]]
+        pairing = None
         for _ in range(n_rounds):
             normals = unit_vectors(area_vectors(vertices[faces]))
             with_normals = join_normals(points, normals, NORMAL_WEIGHT)
-            start, end, distances = nearest_both_ways(with_normals, ends_with_normals, tree)
+            pairing = pairing or Pairing(
+                with_normals, join_normals(ends, end_normals, NORMAL_WEIGHT)
+            )
+            start, end, distances = pairing.pair(with_normals)
             facing = end_normals[end]
             weights = (1 + (distances / reach) ** 2) ** -2
             weights *= np.clip(np.einsum("pi,pi->p", normals[start], facing), 0, 1)

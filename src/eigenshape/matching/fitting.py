@@ -13,7 +13,6 @@ import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
 from scipy.linalg import cho_factor
 from scipy.linalg.lapack import dpotrs
-from scipy.spatial import cKDTree
 
 from certeig.kit.arrays import record
 from eigenshape._vectors import nearest_rotations
@@ -24,6 +23,7 @@ from eigenshape.matching.fitting_loops import (
     turn_frames,
 )
 from eigenshape.matching.match_loops import nearest_rows
+from eigenshape.matching.nearest import RowTree
 from eigenshape.matching.surface import Surface
 
 N_LINKS = 6  # nearest points that a frame stays alike to
@@ -66,7 +66,7 @@ class FitPlan:
 
     part: Surface
     whole: Surface
-    tree: cKDTree
+    tree: RowTree
     frames: Int[np.ndarray, " m"]
     samples: Int[np.ndarray, " s"]
     pull: Float[np.ndarray, " s"]
@@ -80,6 +80,15 @@ class FitPlan:
     compared: Int[np.ndarray, " v"]
     shares: Float[np.ndarray, " v"]
     inner: Bool[np.ndarray, " k"]
+
+    def nearest(
+        self,
+        points: Float[np.ndarray, "k 3"],
+        normals: Float[np.ndarray, "k 3"],
+        guess: Int[np.ndarray, " k"] | None = None,
+    ) -> tuple[Float[np.ndarray, " k"], Int[np.ndarray, " k"]]:
+        """Return how far the nearest vertex of the whole that faces the same way is, and which."""
+        return self.tree.nearest(np.hstack([points, NORMAL_LENGTH * normals]), guess)
 
 
 @record
@@ -141,7 +150,7 @@ def _plan(
     return FitPlan(
         part,
         whole,
-        cKDTree(np.hstack([whole.mesh.vertices, NORMAL_LENGTH * whole.normals])),
+        RowTree(np.hstack([whole.mesh.vertices, NORMAL_LENGTH * whole.normals])),
         frames,
         samples,
         areas / areas.sum(),
@@ -189,12 +198,13 @@ def bend_part(
     turns = np.repeat(turn[None], len(frames), axis=0)
     places = target + (frames - middle) @ turn.T
     matrix = np.empty(plan.graph.shape)
+    nearest = None
 
     for step, stiffness in enumerate(stiffnesses):
         if step >= N_GIVEN:
             # The nearest points of the whole that face the same way pull, the more the nearer.
             points, normals = _carry(plan, turns, places, plan.samples)
-            nearest = plan.tree.query(np.hstack([points, NORMAL_LENGTH * normals]))[1]
+            nearest = plan.nearest(points, normals, nearest)[1]
             planes = whole.normals[nearest]
             steps = whole.mesh.vertices[nearest] - points
             flat = np.einsum("si,si->s", steps, planes)[:, None] * planes
@@ -217,7 +227,7 @@ def bend_part(
             turn_frames(places, plan.one, plan.two, plan.links, *FREE_SIZES, turns)
 
     points, normals = _carry(plan, turns, places, plan.compared)
-    gaps, found = plan.tree.query(np.hstack([points, NORMAL_LENGTH * normals]))
+    gaps, found = plan.nearest(points, normals)
     gaps = np.minimum(gaps, LARGEST_GAP)
     # Strain: how far edges are from what their frames make of them, as a share of squares
     moved = places[plan.two] - places[plan.one]

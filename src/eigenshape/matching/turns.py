@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from certeig.kit.arrays import record
 from eigenshape._vectors import nearest_rotations
-from eigenshape.matching.fitting import LARGEST_GAP, NORMAL_LENGTH, Fit, FitPlan
+from eigenshape.matching.fitting import LARGEST_GAP, Fit, FitPlan
 from eigenshape.matching.spectral_refinement import places_in_faces
 
 N_ROLLS = 12  # about the long axis, each also with the ends exchanged
@@ -53,14 +53,14 @@ def settle(
     part, whole = plan.part, plan.whole.mesh
     starts, weights = part.mesh.vertices[vertices], part.areas[vertices]
     weights = weights / weights.sum()
-    middle = weights @ starts
+    middle, nearest = weights @ starts, np.zeros(len(starts), dtype=np.int64)
     for step in range(steps):
         target = weights @ ends
         products = ((ends - target) * weights[:, None]).T @ (starts - middle)
         rotation = nearest_rotations(products[None])[0]
         points = target + (starts - middle) @ rotation.T
         normals = part.normals[vertices] @ rotation.T
-        nearest = plan.tree.query(np.hstack([points, NORMAL_LENGTH * normals]))[1]
+        nearest = plan.nearest(points, normals, nearest)[1]
         ends = whole.vertices[nearest]
         # Vertices show the way; on a coarse whole, the surface between them ends it.
         if 2 * step + 1 >= steps:

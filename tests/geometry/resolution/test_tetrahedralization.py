@@ -70,6 +70,7 @@ def ball_at(radius, x):
 
 
 @pytest.mark.usefixtures("netgen")
+@pytest.mark.long
 def test_a_cavity_that_faces_out_is_turned_by_the_remedy():
     # One cavity faces in and one out, so that their signed volumes cancel.
     cavities = ball_at(1, 1.5), inverted(ball_at(1, -1.5))

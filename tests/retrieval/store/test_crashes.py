@@ -84,6 +84,7 @@ def test_without_space_the_old_index_is_intact(full_disk, tmp_path):
     assert run_on_a_full_disk(full_disk, tmp_path, 0, 10) == 20
 
 
+@pytest.mark.sweep
 @pytest.mark.long
 def test_without_space_at_each_of_the_first_two_hundred_writes(full_disk, tmp_path):
     assert run_on_a_full_disk(full_disk, tmp_path, 0, 1) == 200

@@ -38,6 +38,7 @@ def test_a_flipped_bit_is_named_and_the_rest_is_served(sound, expected, tmp_path
     assert (len(shares) == 0) == (name == SHARED)
 
 
+@pytest.mark.sweep
 @pytest.mark.long
 def test_hundreds_of_flipped_bits_are_named_and_the_rest_is_served(sound, expected, tmp_path):
     shares = store_trials.try_flips(sound, expected, tmp_path, "index.sqlite", 300, seed=1)

@@ -1,0 +1,54 @@
+"""The nearest of points with normals, asked again and again while they move."""
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from eigenshape.matching.nearest_loops import fill_row_boxes, find_nearest_rows
+
+LEAF = 32  # most rows of a leaf; with 8 or 16 a search is as long or longer
+
+
+class RowTree:
+    """Points with normals, rows of six numbers, in boxes that are halved again and again.
+
+    From round to round of iterated closest points the nearest row changes little, so that a search
+    that begins with the last one opens few boxes: it takes a quarter of the time of a k-d tree's.
+    """
+
+    def __init__(self, rows: Float[np.ndarray, "n 6"]) -> None:
+        self._levels = ((len(rows) - 1) // LEAF).bit_length()
+        self._order = _leaf_order(rows, self._levels)
+        self._places = np.argsort(self._order)
+        self.move(rows)
+
+    def move(self, rows: Float[np.ndarray, "n 6"]) -> None:
+        """Take the rows from where they are now; searches are right, and the slower the more has changed."""
+        self.rows = rows
+        self._ordered = rows[self._order]
+        self._nodes = np.empty(((2 << self._levels) - 1, 2, 6))
+        fill_row_boxes(self._ordered, self._levels, self._nodes)
+
+    def nearest(
+        self, points: Float[np.ndarray, "*k 6"], guess: Int[np.ndarray, "*k"] | None = None
+    ) -> tuple[Float[np.ndarray, "*k"], Int[np.ndarray, "*k"]]:
+        """Return how far the nearest row is from each point, and its number; `guess` has rows that may be near."""
+        shape = points.shape[:-1]
+        found = np.zeros(shape, dtype=np.int64) if guess is None else self._places[guess]
+        squares = np.empty(shape)
+        tree = self._ordered, self._levels, self._nodes
+        points = np.ascontiguousarray(points).reshape(-1, 6)
+        find_nearest_rows(points, *tree, found.reshape(-1), squares.reshape(-1))
+        return np.sqrt(squares), self._order[found]
+
+
+def _leaf_order(rows: Float[np.ndarray, "n 6"], levels: int) -> Int[np.ndarray, " n"]:
+    """Return the order in which rows of a leaf follow each other: each node is halved where it is longest."""
+    order, n, leaves = np.arange(len(rows)), len(rows), 1 << levels
+    for level in range(levels):
+        width = leaves >> level  # of a node, in leaves
+        for leaf in range(0, leaves, width):
+            first, middle, end = ((leaf + part) * n // leaves for part in (0, width // 2, width))
+            block = order[first:end]
+            axis = np.ptp(rows[block], axis=0).argmax()
+            order[first:end] = block[np.argpartition(rows[block, axis], middle - first)]
+    return order
