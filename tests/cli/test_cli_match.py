@@ -60,6 +60,25 @@ def test_a_scale_is_a_word_or_a_number(folder):
     ).output.replace("\n", " ")
 
 
+def test_what_two_parts_share_is_written(folder, tmp_path):
+    mesh = es.read_mesh(folder / "rest.ply")
+    below, above = np.quantile(mesh.vertices[:, 2], [0.25, 0.75])
+    paths = tmp_path / "low.ply", tmp_path / "high.ply"
+    for path, plane in zip(paths, [[0, 0, 1, above], [0, 0, -1, -below]], strict=True):
+        es.write_mesh(es.scans.cut_by_planes(mesh, [plane]).mesh, path)
+    table, picture = tmp_path / "map.csv", tmp_path / "map.png"
+    arguments = "match", *paths, "--overlap", "partial"
+    found = json.loads(run(*arguments, "--json", "-o", table, "--picture", picture).stdout)
+    places = np.array(found["vertices"])
+    assert 0 < (places >= 0).sum() < len(places)
+    assert 0 < sum(found["covered"]) < es.read_mesh(paths[1]).n_vertices
+    assert any("the shapes share" in sentence for sentence in found["report"])
+    rows = list(csv.DictReader(table.read_text().splitlines()))
+    assert [int(row["whole_vertex"]) for row in rows] == found["vertices"]
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert "overlap" in run("match", *paths, "--overlap", "some", code=2).output
+
+
 def test_a_raw_file_is_repaired_and_loose_pieces_are_named(folder):
     mesh = es.read_mesh(folder / "scan.ply")
     n = mesh.n_vertices

@@ -352,6 +352,7 @@ NAMED: dict[str, Callable[[], Any]] = {
     "write_fields.path": lambda: FOLDER / "written.vtu",
     "set_threads.n": lambda: None,
     "match_shapes.scale": lambda: "known",
+    "match_shapes.overlap": lambda: "full",
     "average_onto_points.values": face_vectors,
     "bind.regions": lambda: [head()],
     "boundary_load.mesh": with_boundary,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import sqrt
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -31,6 +31,7 @@ def match(
     *,
     scale: str = "auto",
     mirrored: Annotated[bool | None, typer.Option("--mirrored/--no-mirrored")] = None,
+    overlap: Literal["full", "partial"] = "full",
     repair: str = "auto",
     output: Path | None = None,
     picture: Path | None = None,
@@ -60,6 +61,9 @@ def match(
     mirrored
         Match the mirror image of the part, as a left hand to a right one. By default it is tried where
         patches suggest it, and what was done is printed; --no-mirrored never does that.
+    overlap
+        partial if each of the two shapes has regions that the other one lacks: only the region that
+        both have is mapped.
     output
         Write the map: a table with face, weights and confidence of each vertex of the part (CSV),
         the same as arrays (NPZ), or the nearest vertex of the whole, one a line, as `stability
@@ -80,9 +84,13 @@ def match(
     ours, theirs = (steps.load_surface(path, repair) for path in (mesh, whole))
     with progress_bar("match") as progress:
         side_of_part = "auto" if mirrored is None else mirrored
-        found = es.match_shapes(ours, theirs, scale=size, mirrored=side_of_part, progress=progress)
+        found = es.match_shapes(
+            ours, theirs, scale=size, mirrored=side_of_part, overlap=overlap, progress=progress
+        )
     if as_json:
-        each = {"vertices": found.vertices, "vertex_confidence": found.confidence}
+        each: dict[str, Any] = {"vertices": found.vertices, "vertex_confidence": found.confidence}
+        if overlap == "partial":
+            each["covered"] = found.covered
         print_json({"path": mesh, "whole": whole, **_match_facts(found), **each})
     else:
         _print_match(found)
@@ -94,7 +102,8 @@ def match(
 
 def _match_facts(found: es.matching.ShapeMatch) -> dict[str, Any]:
     """Return what a map says of the whole shape, without what it says of each vertex."""
-    arrays = ("vertices", "faces", "corners", "weights", "confidence", "evidence")
+    of_vertices = "vertices", "faces", "corners", "weights", "confidence", "evidence"
+    arrays = (*of_vertices, "covered", "mapped")
     means = {"mean_confidence": found.confidence.mean(), "share_sure": found.sure().mean()}
     return result_facts(found, *arrays) | means
 

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from scipy.linalg.lapack import dpotrf, dpotrs
 
 from certeig.kit.arrays import record
@@ -60,6 +60,7 @@ class FitPlan:
     is their Laplacian, by which frames hold each other. `arms` are
     from frames to the samples that they carry, and `links` along edges, both before bending.
     Gaps are measured at the vertices `compared`, each of which stands for a share of the area.
+    Only the vertices `inner` of the whole draw samples.
     """
 
     part: Surface
@@ -77,6 +78,7 @@ class FitPlan:
     graph: Float[np.ndarray, "m m"]
     compared: Int[np.ndarray, " v"]
     shares: Float[np.ndarray, " v"]
+    inner: Bool[np.ndarray, " k"]
 
     def nearest(
         self,
@@ -160,12 +162,13 @@ def _plan(
         np.diag(weights.sum(axis=1)) - weights,
         compared,
         areas_compared / areas_compared.sum(),
+        np.ones(whole.mesh.n_vertices, dtype=bool),
     )
 
 
 def fit_part(plan: FitPlan, ends: Int[np.ndarray, " m"]) -> Fit:
     """Bend a part, given the vertices of the whole where its frames lie by a map."""
-    return _fit(plan, ends, STIFFNESS, ALONG)
+    return bend_part(plan, ends, STIFFNESS, ALONG)
 
 
 def slide_part(plan: FitPlan, fit: Fit) -> Fit:
@@ -173,11 +176,11 @@ def slide_part(plan: FitPlan, fit: Fit) -> Fit:
 
     The misfit stays that of the given fit, so that it compares with those of other maps.
     """
-    slid = _fit(plan, fit.places[plan.frames], SLIDING_STIFFNESS, SLIDING_ALONG)
+    slid = bend_part(plan, fit.places[plan.frames], SLIDING_STIFFNESS, SLIDING_ALONG)
     return replace(slid, misfit=fit.misfit)
 
 
-def _fit(
+def bend_part(
     plan: FitPlan, ends: Int[np.ndarray, " m"], stiffnesses: tuple[float, ...], along: float
 ) -> Fit:
     """Bend a part step by step, ever less stiff."""
@@ -206,7 +209,7 @@ def _fit(
             flat = np.einsum("si,si->s", steps, planes)[:, None] * planes
             targets = points + flat + along * (steps - flat)
             facing = np.clip(np.einsum("si,si->s", normals, planes), 0, 1)
-            pull = plan.pull * facing / (1 + (steps**2).sum(axis=1) / SOFT**2)
+            pull = plan.pull * plan.inner[nearest] * facing / (1 + (steps**2).sum(axis=1) / SOFT**2)
         # Move frames so that samples come nearer to their targets, and turn frames to follow.
         # Frames that nothing pulls are held by a little more than 0.
         least = 1e-9 / len(frames)

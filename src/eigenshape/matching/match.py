@@ -2,11 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float, Int
 from scipy.spatial import cKDTree
 
+from certeig.kit.arguments import require_choice
 from certeig.kit.arrays import record
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.progress import Progress, silent
@@ -25,6 +27,7 @@ from eigenshape.matching.evidence import (
 )
 from eigenshape.matching.fitting import plan_fit
 from eigenshape.matching.growth import equally_good_maps, find_maps, first_support
+from eigenshape.matching.overlap import factor_of_overlap, match_overlap
 from eigenshape.matching.pairs import Pairs, patch_differences
 from eigenshape.matching.pieces import (
     Piece,
@@ -64,6 +67,7 @@ CLEAR_VOTE = 0.3
 MIRROR_HINT, SURER = 1.25, 0.05
 # A piece of the whole with less free area than this share of a piece of the part is taken.
 FREE = 0.5
+Overlap = Literal["full", "partial"]
 
 
 @one_blas_thread()
@@ -73,6 +77,7 @@ def match_shapes(
     *,
     scale: str | float = "auto",
     mirrored: str | bool = "auto",
+    overlap: str = "full",
     progress: Progress | None = None,
 ) -> ShapeMatch:
     """Find the point of a whole shape that corresponds to each vertex of a part of it.
@@ -124,7 +129,13 @@ def match_shapes(
     mirrored : "auto", True or False
         Whether the part is matched as its mirror image, as a left hand to a right one. "auto" tries that,
         too, where the patches of the mirror image support each other better by a third, and keeps
-        the surer map; `ShapeMatch.mirrored` and the report say so.
+        the surer map; `ShapeMatch.mirrored` and the report say so. Of parts that overlap, the
+        mirror image is matched only on request.
+    overlap : "full" or "partial"
+        "full": all of the part lies on the whole. "partial": each of the two shapes has regions that
+        the other one lacks. The region that both have is found, and the map in it; no vertex has a
+        place if there is none. The largest piece of each shape is matched, in one unit of length or
+        by the factor `scale`.
     progress : callable, optional
         Called as progress(fraction_done, message).
 
@@ -135,7 +146,8 @@ def match_shapes(
     Raises
     ------
     InvalidParameterError
-        If `scale` or `mirrored` is none of these; or it is "known" or a number, and the part has more than 1.5
+        If `scale`, `mirrored` or `overlap` is none of these; if `scale` is "unknown" for parts that
+        overlap; or if `scale` is "known" or a number, and the part has more than 1.5
         times the area of the whole, or several pieces and none with 1 % of that area.
     InvalidShapeError
         If a mesh has a face without area or twice, a vertex without face, or neighboring faces that
@@ -150,10 +162,10 @@ def match_shapes(
     Notes
     -----
     Nothing is found where part and whole have nothing in common, but a map is returned all the
-    same: look at `confidence`. If the shape can be turned into itself, there are several maps:
-    look at `n_equally_good`. A piece of more than 16,000 vertices or with needles is matched by way
-    of a copy with fewer vertices, and the map is transferred. A part of 5,000 vertices takes 2 to 4 s on one
-    core, by the machine.
+    same: look at `confidence`, or pass overlap="partial". If the shape can be turned into itself,
+    there are several maps: look at `n_equally_good`. A piece of more than 16,000 vertices or with
+    needles is matched by way of a copy with fewer vertices, and the map is transferred. A part
+    of 5,000 vertices takes 2 to 4 s on one core, by the machine.
 
     Examples
     --------
@@ -175,10 +187,22 @@ def match_shapes(
     scale = require_scale(scale)
     if not (isinstance(mirrored, bool) or mirrored == "auto"):
         raise InvalidParameterError(f'mirrored must be "auto", True or False; it is {mirrored!r}.')
+    require_choice(overlap, Overlap, "overlap")
+    is_partial = overlap == "partial"
+    if is_partial:
+        factor = factor_of_overlap(scale)
     tell(0.0, "prepare the whole")
     target = as_target(whole)
     # Even a part that is as large as it may be has its large pieces among these.
     pieces = split_pieces(mesh, LEAST_AREA / MOST_AREA)
+    image = TriangleMesh(mesh.vertices * [-1, 1, 1], mesh.faces[:, ::-1])
+    if is_partial:
+        tell(0.5, "match")
+        in_mirror = mirrored is True
+        largest = split_pieces(image if in_mirror else mesh, LEAST_AREA / MOST_AREA)[0]
+        found = replace(match_overlap(mesh, largest, target, factor), mirrored=in_mirror)
+        tell(1.0, "matched")
+        return found
     if scale == "unknown":
         tell(0.3, "find the scale")
     hypotheses = choose_factors(mesh, pieces, target, scale)
@@ -188,7 +212,6 @@ def match_shapes(
         maps = [_match_pieces(mesh, pieces, target, *each) for each in hypotheses]
         return max(maps, key=lambda each: each[0].confidence.mean())
 
-    image = TriangleMesh(mesh.vertices * [-1, 1, 1], mesh.faces[:, ::-1])
     if mirrored is True:
         found = replace(surest(split_pieces(image, LEAST_AREA / MOST_AREA))[0], mirrored=True)
     else:

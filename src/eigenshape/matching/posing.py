@@ -39,7 +39,7 @@ def take_pose(mesh: MeshLike, like: MeshLike, *, match: ShapeMatch | None = None
     Raises
     ------
     InvalidParameterError
-        If the match has another number of vertices than the mesh.
+        If the match has another number of vertices than the mesh, or leaves some out.
     InvalidShapeError
         If a mesh cannot be matched; see `match_shapes`.
 
@@ -71,6 +71,11 @@ def take_pose(mesh: MeshLike, like: MeshLike, *, match: ShapeMatch | None = None
         raise InvalidParameterError(
             f"The match must be of the mesh that is bent; it has {match.n_vertices} vertices, and "
             f"the mesh has {mesh.n_vertices}. Pass match_shapes(mesh, like)."
+        )
+    if not match.mapped.all():
+        raise InvalidParameterError(
+            f"The match must place each vertex; it leaves out {(~match.mapped).sum()} vertices, first "
+            f"{match.mapped.argmin()}. Pass match_shapes(mesh, like), without an overlap."
         )
     image = TriangleMesh(match.pull(like.vertices) / factor, mesh.faces)
     return transfer_deformation(mesh, image, mesh, np.arange(mesh.n_vertices))

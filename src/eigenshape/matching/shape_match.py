@@ -3,7 +3,7 @@
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Int, Integer
 from numpy.typing import DTypeLike, NDArray
 
 from certeig.kit.arrays import ReadOnly, as_array, record
@@ -14,6 +14,9 @@ from certeig.kit.typing import ArrayLike
 @record
 class ShapeMatch(ReadOnly):
     """Where each vertex of a part lies on a whole.
+
+    Of two parts that overlap, vertices outside the overlap have no place: `vertices`, `faces` and
+    `corners` are -1 there, `weights` nan, and `confidence` and `evidence` 0.
 
     Attributes
     ----------
@@ -34,6 +37,7 @@ class ShapeMatch(ReadOnly):
         other starts put the vertex, local stretch, gap that is left after bending, weight of the
         nearest patch, its difference from that of its image; and of the whole map orientation,
         support, mean difference, and the logarithm of the gap after bending times the root of strain.
+        Of parts that overlap, 3 columns: change of distances, gap, and how good the whole map is.
     score : float
         How good the whole map is, 0 to 1: orientation × coverage² × support of pairs × likeness⁴ of
         patches. Of the sizes that `scale="unknown"` tries, the one with the highest score is taken.
@@ -57,7 +61,10 @@ class ShapeMatch(ReadOnly):
         Whether the mirror image of the part was matched.
     report : tuple of str
         What was chosen or left out, in sentences: the scale, loose pieces, and, of a whole of several
-        pieces, which piece of the part was placed on which of them.
+        pieces, which piece of the part was placed on which of them. Of parts that overlap, how much of
+        each is shared.
+    covered : (m,) bool, optional
+        Of parts that overlap, which vertices of the other part lie in the overlap.
 
     See Also
     --------
@@ -86,6 +93,12 @@ class ShapeMatch(ReadOnly):
     scale: float
     report: tuple[str, ...]
     mirrored: bool = False
+    covered: Bool[np.ndarray, " m"] | None = None
+
+    @property
+    def mapped(self) -> Bool[np.ndarray, " n"]:
+        """Which vertices of the part have a place: all, or of parts that overlap those that both have."""
+        return self.vertices >= 0
 
     @property
     def n_vertices(self) -> int:
@@ -96,7 +109,9 @@ class ShapeMatch(ReadOnly):
         """Return `vertices`, so that functions that take a list of vertices take a match."""
         return np.array(self.vertices, dtype=dtype)
 
-    def pull(self, values: ArrayLike) -> Float[np.ndarray, "n ..."] | Int[np.ndarray, " n"]:
+    def pull(
+        self, values: ArrayLike
+    ) -> Float[np.ndarray, "n ..."] | Integer[np.ndarray, "n ..."] | Bool[np.ndarray, "n ..."]:
         """Give each vertex of the part the value of its point on the whole.
 
         Parameters
@@ -104,7 +119,7 @@ class ShapeMatch(ReadOnly):
         values : (m, ...) array
             A value, or a row of values, for each vertex of the whole. Floats, such as positions or
             functions, are interpolated; whole numbers and booleans, such as labels, are copied from
-            the nearest vertex.
+            the nearest vertex. Vertices without a place get nan, -1 in whole numbers with a sign, else 0.
 
         Returns
         -------
@@ -123,7 +138,9 @@ class ShapeMatch(ReadOnly):
                 f"{table.shape}, and the map uses vertex {last}."
             )
         if table.dtype.kind in "iub":
-            return table[self.vertices]
+            found = table[self.vertices]
+            found[~self.mapped] = -1 if table.dtype.kind == "i" else 0
+            return found
         return np.einsum("nc,nc...->n...", self.weights, table[self.corners])
 
     def sure(self, least: float = 0.5) -> Bool[np.ndarray, " n"]:

@@ -88,12 +88,13 @@ def figure_match(
     left, right = figure.subplots(1, 2)
     colors = place_colors(whole.vertices)
     sure = match.confidence[:, None]
-    pulled = sure * match.pull(colors) + (1 - sure) * GRAY
+    pulled = np.where(match.mapped[:, None], sure * match.pull(colors) + (1 - sure) * GRAY, GRAY)
     camera = aim_camera(part, view=view, up=up)
     turned = Camera(camera.rotation @ _rotation_of_map(part, whole, match).T, camera.size)
     show(left, draw(part, camera, vertex_colors=pulled))
     show(right, draw(whole, turned, vertex_colors=colors))
-    left.set_title(f"part: {match.confidence.mean():.0%} sure on average", fontsize=10)
+    average = match.confidence[match.mapped].mean() if match.mapped.any() else 0.0
+    left.set_title(f"part: {average:.0%} sure on average", fontsize=10)
     right.set_title("whole", fontsize=10)
     return figure
 
@@ -103,7 +104,7 @@ def _rotation_of_map(
 ) -> Float[np.ndarray, "3 3"]:
     """Return the rotation that takes the part best to where the map sends it (Kabsch 1976)."""
     points, _ = scale_to_unit(part.vertices)
-    images = match.pull(scale_to_unit(whole.vertices)[0])
+    images = np.nan_to_num(match.pull(scale_to_unit(whole.vertices)[0]))
     weights = (match.confidence * dual_volumes(part))[:, None]
     weights = weights / (weights.sum() or 1.0)
     arms = points - (weights * points).sum(axis=0)
