@@ -57,6 +57,8 @@ N_BENT_ROLLS = 2  # rolls of a nearly rigid part from which it is bent
 # share of the gap: on a right place a foot has 1.03 times the misfit of a wrong one, and an eighth of its gap.
 ABOUT_AS_GOOD, NEARER = 1.1, 0.5
 MOST_SMOOTHINGS = 2  # it ends earlier if a bend is no better
+# Maps to other places that are refined, too: how many at most, and up to how many times the least misfit
+N_REFINED, WORTH_REFINING = 3, 1.4
 # Misfit up to which a map is as good as any, and the same in mean edges of the whole, which is more
 # on coarse meshes. The best rivals of 24 balls, ellipsoids, rings, cylinders and boxes, turned into
 # themselves or with other triangles, have 0 to 2.3e-3 or up to 0.12 edges; of a ball of 10,242 vertices,
@@ -75,6 +77,9 @@ NEARLY_AS_GOOD = 1.2
 # At its true place in another pose, a foot of a quadruped is 0.0027 to 0.0068 away from the surface by
 # a turn; at the ends of other legs, 0.0011 to 0.0016.
 SMALL_SHARE, POSED, TIMES_AS_FAR, N_SMALL_PLACES = 0.15, 0.008, 6.0, 8
+# Patches tell places apart if their differences there are larger by this much, in logarithms: right
+# places of creatures lead by 0.15 to 0.3, or by less than 0.06, as wrong ones do. That of copies is 0.
+LESS_ALIKE, LEAST_DIFFERENCE = 0.15, 1.0
 MOST_OF_AREA = 0.5  # two maps differ if they do over this share of the part
 TAKEN = 0.12  # places this near to the image of a point are taken by the best map
 
@@ -131,8 +136,6 @@ def find_maps(
     maps = grow_maps(plan, differences) if len(plan.part.points) >= N_FAR else []
     if not maps:
         return [], None
-    # Bend the part again from the best map, made smooth by low modes, as long as that is better.
-    # The new map takes the place of the one that it was made from, and keeps its pairs.
     turn = settle_map(plan, maps[0].fit.places)
     if not is_rigid(plan, turn) and turn.gap < NEARLY_RIGID:
         # Bending forgives a roll about a long axis, so that starts that are rolled are missing, and
@@ -141,14 +144,35 @@ def find_maps(
         maps, turn = most_rigid_first(plan, maps)
     if is_rigid(plan, turn):
         return [FittedMap(maps[0].pairs, turned_fit(plan, turn)), *maps[1:]], turn
-    best = maps[0]
+    # Bends of the front and the back of a body differ by less than refining lowers their misfits.
+    most = WORTH_REFINING * maps[0].fit.misfit
+    near = [n for n in _different(plan, maps)[:N_REFINED] if maps[n].fit.misfit < most]
+    maps = [_refine(plan, one, ours, theirs) if n in near else one for n, one in enumerate(maps)]
+    if turn.gap >= NEARLY_RIGID:
+        # The others stay in their order, in which vertices compare them.
+        best = maps.pop(min(near, key=lambda n: maps[n].fit.misfit))
+        maps, turn = [best, *maps], settle_map(plan, best.fit.places)
+    return [FittedMap(maps[0].pairs, slide_part(plan, maps[0].fit)), *maps[1:]], turn
+
+
+def _refine(plan: FitPlan, best: FittedMap, ours: Modes, theirs: Modes) -> FittedMap:
+    """Bend the part again from a map, made smooth by low modes, as long as that is better."""
     for _ in range(MOST_SMOOTHINGS):
         places, _ = smooth_places(ours, theirs, best.fit.places, N_LOW_MODES)
         fit = fit_part(plan, places[plan.frames])
         if fit.misfit >= best.fit.misfit:
             break
         best = FittedMap(best.pairs, fit)
-    return [FittedMap(best.pairs, slide_part(plan, best.fit)), *maps[1:]], turn
+    return best
+
+
+def _different(plan: FitPlan, maps: Sequence[FittedMap]) -> list[int]:
+    """Return the numbers of maps that each place most of the part elsewhere than those before."""
+    found: list[int] = []
+    for number, one in enumerate(maps):
+        if all(_differ(plan, one, maps[other]) for other in found):
+            found.append(number)
+    return found
 
 
 def _rolled_maps(
@@ -258,7 +282,10 @@ def equally_good_maps(
     if plan.part.area < SMALL_SHARE * whole.area and turn.gap < POSED:
         rivals, most = _small_places(plan, maps), min(POSED, TIMES_AS_FAR * turn.gap)
     elif best.fit.misfit > most:
-        return 0, n_places
+        # Nothing tells where a part lies if it fits about as well elsewhere, and as nearly rigid.
+        rivals, most = _as_good(plan, differences, maps, turn), np.inf
+        if not rivals:
+            return 0, n_places
     else:
         # Starts of a search all lead to one map if that fits perfectly. So the search is repeated with
         # patches that are less alike where the first map places them.
@@ -281,14 +308,31 @@ def equally_good_maps(
     return len(found), n_places
 
 
+def _as_good(
+    plan: FitPlan, differences: Float[np.ndarray, "m k"], maps: Sequence[FittedMap], turn: Turn
+) -> list[FittedMap]:
+    """Return maps that fit about as well as the first, whose patches are about as alike, no farther from a turn."""
+
+    def unlike(one: FittedMap) -> float:
+        points = plan.part.points
+        found = differences[np.arange(len(points)), plan.whole.nearest[one.fit.places[points]]]
+        return float(np.log(np.maximum(found, LEAST_DIFFERENCE)).mean())
+
+    best = maps[0]
+    return [
+        one
+        for one in maps[1:]
+        if one.fit.misfit < ABOUT_AS_GOOD * best.fit.misfit
+        and unlike(one) < unlike(best) + LESS_ALIKE
+        and turn.gap > NEARER * settle_map(plan, one.fit.places).gap
+    ]
+
+
 def _small_places(plan: FitPlan, maps: Sequence[FittedMap]) -> list[FittedMap]:
     """Return where a small part lies by turns that settle from different maps, rolled, too."""
-    different: list[FittedMap] = []
-    for one in maps:
-        if all(_differ(plan, one, other) for other in different):
-            different.append(one)
     places = []
-    for one in different[:N_SMALL_PLACES]:
+    for number in _different(plan, maps)[:N_SMALL_PLACES]:
+        one = maps[number]
         rolled = rolled_turns(plan, settle_map(plan, one.fit.places))
         places += [FittedMap(one.pairs, turned_fit(plan, turn)) for turn in rolled[:N_BENT_ROLLS]]
     return places
