@@ -113,6 +113,7 @@ DEFAULTS = {
     "index add timeout": (es.retrieval.Workers, "timeout"),
     "index duplicates score": (es.retrieval.find_duplicates, "most_score"),
     "index learn timeout": (es.retrieval.Workers, "timeout"),
+    "match overlap": (es.match_shapes, "overlap"),
     "match scale": (es.match_shapes, "scale"),
     "query n_matches": (es.ShapeIndex.query, "n_matches"),
     "stability n_samples": (es.stability.StabilityPlan, "n_samples"),

@@ -101,9 +101,9 @@ def match_shapes(
        bent onto the whole by each of these maps: first to where the map places its points, then to
        the nearest points that face the same way (non-rigid registration). The map after which the
        smallest gaps are left with the least strain is taken.
-    5. The four best maps are grown and bent again, and the best one also from where it lies after 60
-       eigenfunctions of both shapes made it smooth. From there the part slides: it is bent once
-       more, nearly free to move along the surface.
+    5. The four best maps are grown and bent again, and the best one, and others elsewhere that are
+       about as good, also from where they lie after 60 eigenfunctions of both shapes made them
+       smooth. From there the part slides: it is bent once more, nearly free to move along the surface.
     6. Eigenfunctions of both shapes make the best map smooth, if the whole has 750 vertices or more.
 
     A rigid turn decides what bending leaves open. If the turn in which the best map settles (nearest

@@ -53,8 +53,9 @@ class ShapeMatch(ReadOnly):
         How many maps that differ over most of the part fit as well as this one, itself among them: 1
         if it is the only one. A ball turned on itself has many, a cube 24. The search ends at about
         ten. A whole of two equal pieces has two, and `report` names the other piece. A small part has
-        one more for each place that fits but for what a pose changes. Where other maps
-        place a vertex elsewhere, its confidence is divided by their number.
+        one more for each place that fits but for what a pose changes, and a body one whose back fits
+        within a tenth. Where other maps place a vertex elsewhere, its confidence is divided by their
+        number.
     scale : float
         Factor by which lengths of the part were multiplied.
     mirrored : bool
