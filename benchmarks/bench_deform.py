@@ -58,9 +58,11 @@ COLUMNS = (
 
 
 def region_of(mesh: es.TriangleMesh, name: str) -> np.ndarray:
-    """Return the half behind the middle, or what lies within a quarter of the height, along the surface, of a foot."""
+    """Return the half nearest to the tail, or what lies within a quarter of the height of a foot, along the surface."""
     if name == "half":
-        return mesh.vertices[:, 2] < np.median(mesh.vertices[:, 2])
+        # In one piece: of the half behind the middle, a front foot was a patch of its own.
+        (away,) = es.geometry.geodesic_distances(mesh, [int(np.argmin(mesh.vertices[:, 2]))])
+        return away < np.median(away)
     height = np.ptp(mesh.vertices[:, 1])
     foot = int(np.argmin(mesh.vertices[:, 1] + 1e-3 * mesh.vertices[:, 2]))
     return es.deformation.region_mask(

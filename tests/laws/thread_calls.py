@@ -659,7 +659,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "partial_scan": lambda v: es.partial_scan(v.many, [0, 0, 1], resolution=100),
     "patch_descriptor": lambda v: es.retrieval.patch_descriptor([v.patches[0]], v.recipe),
     "query_indexes": lambda v: es.retrieval.query_indexes(
-        v.by_patches[0], [v.index.folder, v.index.folder], n_matches=2
+        v.by_patches[0], [v.index.folder], n_matches=2
     ),
     "patch_scores": lambda v: es.retrieval.patch_scores(v.by_patches[0], v.by_patches),
     "persistence_diagram": lambda v: es.features.persistence_diagram(v.solid, v.solid.points[:, 0]),
