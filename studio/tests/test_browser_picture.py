@@ -212,9 +212,9 @@ def test_on_a_phone_fingers_turn_zoom_and_bend_where_they_are_told_to(browser, u
         find(page, "tab-compare").click()
         find(page, "second-sample").select_option("hand")
         wait_until(page, "eigenshape.second?.viewer.vertices.length > 0")
+        wait_until_still(page)
         boxes = [find(page, name).bounding_box() for name in ("stage", "beside")]
-        assert [box["width"] for box in boxes] == [PHONE[0] / 2, PHONE[0] / 2]
-        assert boxes[0]["height"] == boxes[1]["height"] == stage["height"]
+        assert boxes == [stage | {"x": x, "width": PHONE[0] / 2} for x in (0, PHONE[0] / 2)]
         assert page.evaluate("eigenshape.second.viewer.covered") > 100
         # Also where the panel has gone away, nothing of them is cut off.
         find(page, "sheet").click()

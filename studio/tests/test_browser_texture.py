@@ -4,7 +4,15 @@ from io import BytesIO
 
 import numpy as np
 import pytest
-from browser import drop_file, find, open_page, picture, serve_studio, wait_until
+from browser import (
+    drop_file,
+    find,
+    open_page,
+    picture,
+    serve_studio,
+    wait_until,
+    wait_until_still,
+)
 from PIL import Image
 from scipy.sparse import eye_array
 
@@ -97,6 +105,8 @@ def test_only_a_shape_with_a_look_has_the_button(page, tmp_path):
     text = "\n".join(f"v {x} {y} {z} {y * 0 + 0.2} 0.9 0.1" for x, y, z in ball.vertices.tolist())
     faces = "\n".join("f " + " ".join(map(str, face)) for face in (ball.faces + 1).tolist())
     (tmp_path / "ball.obj").write_text(f"{text}\n{faces}\n")
+    # What is asked of a shape that is replaced is answered by an error.
+    wait_until_still(page)
     drop_file(page, "stage", tmp_path / "ball.obj")
     wait_until(page, SHOWN)
     assert find(page, "texture").is_visible()
