@@ -26,6 +26,7 @@ from eigenshape.matching.pairs import (
     descriptor_costs,
     first_candidates,
     grow_pairs,
+    log_differences,
     place_points,
     select_pairs,
 )
@@ -78,8 +79,8 @@ NEARLY_AS_GOOD = 1.2
 # a turn; at the ends of other legs, 0.0011 to 0.0016.
 SMALL_SHARE, POSED, TIMES_AS_FAR, N_SMALL_PLACES = 0.15, 0.008, 6.0, 8
 # Patches tell places apart if their differences there are larger by this much, in logarithms: right
-# places of creatures lead by 0.15 to 0.3, or by less than 0.06, as wrong ones do. That of copies is 0.
-LESS_ALIKE, LEAST_DIFFERENCE = 0.15, 1.0
+# places of creatures lead by 0.15 to 0.3, or by less than 0.06, as wrong ones do.
+LESS_ALIKE = 0.15
 MOST_OF_AREA = 0.5  # two maps differ if they do over this share of the part
 TAKEN = 0.12  # places this near to the image of a point are taken by the best map
 
@@ -315,15 +316,16 @@ def _as_good(
 
     def unlike(one: FittedMap) -> float:
         points = plan.part.points
-        found = differences[np.arange(len(points)), plan.whole.nearest[one.fit.places[points]]]
-        return float(np.log(np.maximum(found, LEAST_DIFFERENCE)).mean())
+        partners = plan.whole.nearest[one.fit.places[points]]
+        return float(log_differences(differences, np.arange(len(points)), partners).mean())
 
     best = maps[0]
+    most_unlike = unlike(best) + LESS_ALIKE
     return [
         one
         for one in maps[1:]
         if one.fit.misfit < ABOUT_AS_GOOD * best.fit.misfit
-        and unlike(one) < unlike(best) + LESS_ALIKE
+        and unlike(one) < most_unlike
         and turn.gap > NEARER * settle_map(plan, one.fit.places).gap
     ]
 

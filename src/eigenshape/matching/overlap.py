@@ -42,6 +42,7 @@ from eigenshape.matching.pairs import (
     Pairs,
     couplings,
     descriptor_costs,
+    log_differences,
     patch_differences,
     place_points,
     select_pairs,
@@ -68,7 +69,6 @@ MOST_GAP = 0.05  # of a vertex in the region, with normals
 # less, on the median. Without this, errors grow with each round; with 0.15 wrong limbs are taken in.
 NEAR, FAR, MOST_STRETCH = 0.15, 0.5, 0.12
 SMALL_PIECE = 0.1  # pieces of a region with a smaller share of the largest one are dropped
-LEAST_DIFFERENCE = 1.0  # of patches; that of copies is 0
 # The part is stiffer than one that lies on the whole in whole: fewer features keep it from sliding.
 STIFFNESSES = tuple(3 * each for each in STIFFNESS)
 # A region ends where one of the parts ends: this near to a boundary, in units, or in mean edges. What
@@ -271,7 +271,7 @@ def window_pairs(
         if len(chosen) < FEWEST:
             return None
         support = float(np.abs(coupling[np.ix_(chosen, chosen)].sum(axis=1)).mean())
-        unlike = _unlikeness(differences, pairs.points, pairs.partners)
+        unlike = float(log_differences(differences, pairs.points, pairs.partners).mean())
         return support**2 / len(chosen) * np.exp(-unlike / 2), pairs
 
     found = map_in_threads(agree, range(len(ours) * len(theirs)))
@@ -284,15 +284,6 @@ def _windows(surface: Surface, count: int) -> Int[np.ndarray, "w p"]:
     size = max(int(WINDOW * len(surface.points)), N_PARTNERS)
     near = np.argsort(surface.between[:count], axis=1, kind="stable")[:, :size]
     return np.sort(near, axis=1)
-
-
-def _unlikeness(
-    differences: Float[np.ndarray, "m k"],
-    points: Int[np.ndarray, " p"],
-    partners: Int[np.ndarray, " p"],
-) -> float:
-    """Return the mean logarithm of the differences of the patches of pairs."""
-    return float(np.log(np.maximum(differences[points, partners], LEAST_DIFFERENCE)).mean())
 
 
 def _different(whole: Surface, regions: Sequence[Region]) -> list[Region]:
@@ -313,12 +304,7 @@ def _told_apart(
     if len(both) < FEWEST:
         return True
     ours, theirs = (
-        np.log(
-            np.maximum(
-                differences[both, plan.whole.nearest[each.fit.places[points[both]]]],
-                LEAST_DIFFERENCE,
-            )
-        )
+        log_differences(differences, both, plan.whole.nearest[each.fit.places[points[both]]])
         for each in (one, other)
     )
     away = theirs - ours

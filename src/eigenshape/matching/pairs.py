@@ -14,6 +14,7 @@ N_CANDIDATES = 5  # partners that are tried for each point; ten found nothing mo
 # many times. Near a boundary both discs are cut alike, and weigh more than the product of their
 # weights.
 FOREIGN, RIM_SHARE = 1.2, 0.5
+LEAST_DIFFERENCE = 1.0  # of patches, in logarithms; that of copies is 0
 # Share of a distance by which two pairs may disagree and still support each other
 DISTANCE_SLACK = 0.4
 # The same, for starts. What a wide one finds a narrow one misses and the other way round: of 15 hard
@@ -89,6 +90,15 @@ def _differences(part: Surface, other: Surface | View, power: float) -> Float[np
         total = total + share * np.maximum(squares, 0)
         weights = weights + share
     return np.asarray(total / weights, dtype=np.float64)
+
+
+def log_differences(
+    differences: Float[np.ndarray, "m k"],
+    points: Int[np.ndarray, " p"],
+    partners: Int[np.ndarray, " p"],
+) -> Float[np.ndarray, " p"]:
+    """Return the logarithms of the differences of the patches of pairs."""
+    return np.log(np.maximum(differences[points, partners], LEAST_DIFFERENCE))
 
 
 def descriptor_costs(differences: Float[np.ndarray, "m k"]) -> Float[np.ndarray, "m k"]:
