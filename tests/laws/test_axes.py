@@ -244,6 +244,7 @@ ORDERED = {
     "prepare_heat_geodesics": BY_CORNER,
     "prepare_vector_heat": BY_CORNER,
     "sample_surface": BY_SEARCH,
+    "transfer": BY_CORNER,
     "transfer_labels": "names a corner of the clearest face",
     "witness_region": BY_SEARCH,
 }
