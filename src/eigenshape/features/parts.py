@@ -65,7 +65,7 @@ class PartDecomposition(ReadOnly):
     >>> import eigenshape as es
     >>> found = es.find_parts(es.make_creature("biped", n_vertices=1200))
     >>> len(found.parts.features.vertices), found.heat.shape
-    (8, (1200,))
+    (9, (1200,))
     """
 
     mesh: TriangleMesh
