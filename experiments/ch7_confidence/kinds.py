@@ -1,8 +1,10 @@
 """Pairs with known maps of six kinds, and strangers, in two halves that share no individual."""
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property, partial
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -15,18 +17,25 @@ from rows import read
 
 N_VERTICES = 1000
 HALVES = ("choosing", "reporting")
+KINDS = ("animals", "long bones", "irregular", "flat", "machine parts", "coarse", "strangers")
 COARSE = 300, 800  # vertices of coarse meshes, least and most
 PLATE = 0.06  # half the thickness of a plate, beside a radius of about 1
 
 
 @dataclass(frozen=True)
 class Drawn:
-    """A pair by its kind and half; strangers belong nowhere, so that all places are wrong."""
+    """A pair by its kind and half, made when it is needed; strangers belong nowhere: all places are wrong."""
 
     kind: str
     half: str
-    pair: Pair
+    name: str
+    make: Callable[[], Pair]
     belongs: bool = True
+
+    @cached_property
+    def pair(self) -> Pair:
+        """The part and the whole."""
+        return self.make()
 
 
 def rock(seed: int) -> es.TriangleMesh:
@@ -117,6 +126,12 @@ def shapes() -> Iterator[tuple[str, str, str, tuple[es.TriangleMesh, es.Triangle
             "cup/psb24",
         ),
     }
+    more_machines = {
+        ("choosing", "bearing"): 348,
+        ("choosing", "mech"): 328,
+        ("reporting", "bearing"): 350,
+        ("reporting", "mech"): 330,
+    }
     for number, half in enumerate(HALVES):
         for kind in creatures[half]:
             both = tuple(
@@ -137,12 +152,21 @@ def shapes() -> Iterator[tuple[str, str, str, tuple[es.TriangleMesh, es.Triangle
             yield "machine parts", half, name, (read(name),) * 2
         for name in coarse[half]:
             yield "coarse", half, name, (read(f"retrieval/{name}.ply"),) * 2
+    # Many machine parts can be turned into themselves, so that what few pairs say is chance.
+    for half, name in product(HALVES, ("bearing", "mech")):
+        number = more_machines[half, name]
+        yield (
+            "machine parts",
+            half,
+            f"{name} {number}",
+            (read(f"retrieval/{name}/psb{number}.ply"),) * 2,
+        )
 
 
 def draw(*, quick: bool) -> Iterator[Drawn]:
     """Yield pairs: of each shape a whole, a cut, and a stretched whole or scan; and strangers."""
-    strangers: dict[str, list[Pair]] = {half: [] for half in HALVES}
-    for number, (kind, half, name, (one, other)) in enumerate(shapes()):
+    strangers: dict[str, list[Drawn]] = {half: [] for half in HALVES}
+    for number, (kind, half, name, shapes_of_name) in enumerate(shapes()):
         ways = [("wholes", False), ("cuts", False), ("wholes", True), ("scans", False)]
         # Poses stretch animals already; of the others, a third is bent and stretched.
         chosen = (
@@ -155,30 +179,43 @@ def draw(*, quick: bool) -> Iterator[Drawn]:
         if quick:
             chosen = chosen[:1] if number % 13 == 0 else []
         for way, stretch in chosen:
-            rng = np.random.default_rng([number, len(way), stretch])
-            sizes = (N_VERTICES, N_VERTICES)
-            if kind == "coarse":
-                sizes = tuple(int(n) for n in rng.integers(*COARSE, 2))
-            first = stretched(one, rng) if stretch else one
-            pair = pair_of(
-                f"{name} {way}{' stretched' * stretch}", (first, other), way, rng, sizes=sizes
-            )
-            yield Drawn(kind, half, pair)
+            title = f"{name} {way}{' stretched' * stretch}"
+            make = partial(make_known, title, kind, shapes_of_name, way, number, stretch=stretch)
+            drawn = Drawn(kind, half, title, make)
+            yield drawn
             if way == "cuts" or kind == "coarse":
-                strangers[half].append(pair)
+                strangers[half].append(drawn)
     for half, pairs in strangers.items():
         for number in range(0, len(pairs), 2):
             ours, theirs = pairs[number], pairs[(number + len(pairs) // 2) % len(pairs)]
-            size = np.sqrt(
-                es.geometry.surface_area(theirs.whole) / es.geometry.surface_area(ours.whole)
-            )
-            part = es.TriangleMesh(size * ours.part.vertices, ours.part.faces)
-            pair = Pair(
-                f"{ours.name} on {theirs.name}",
-                part,
-                theirs.whole,
-                ours.vertices,
-                ours.points,
-                ours.distances,
-            )
-            yield Drawn("strangers", half, pair, belongs=False)
+            title = f"{ours.name} on {theirs.name}"
+            make = partial(make_strangers, title, ours, theirs)
+            yield Drawn("strangers", half, title, make, belongs=False)
+
+
+def make_known(
+    title: str,
+    kind: str,
+    shapes_of_name: tuple[es.TriangleMesh, es.TriangleMesh],
+    way: str,
+    number: int,
+    *,
+    stretch: bool,
+) -> Pair:
+    """Return a part of the first of two shapes, and the second one, of a number of vertices that the kind has."""
+    one, other = shapes_of_name
+    rng = np.random.default_rng([number, len(way), stretch])
+    sizes = (N_VERTICES, N_VERTICES)
+    if kind == "coarse":
+        sizes = tuple(int(n) for n in rng.integers(*COARSE, 2))
+    first = stretched(one, rng) if stretch else one
+    return pair_of(title, (first, other), way, rng, sizes=sizes)
+
+
+def make_strangers(title: str, one: Drawn, other: Drawn) -> Pair:
+    """Return the part of one pair in the size of another one, and the whole of that."""
+    ours, theirs = one.pair, other.pair
+    areas = [es.geometry.surface_area(pair.whole) for pair in (ours, theirs)]
+    size = np.sqrt(areas[1] / areas[0])
+    part = es.TriangleMesh(size * ours.part.vertices, ours.part.faces)
+    return Pair(title, part, theirs.whole, ours.vertices, ours.points, ours.distances)
