@@ -253,6 +253,7 @@ def network_of(mesh):
     return boundaries.build_network(mesh, tensors)
 
 
+@pytest.mark.long
 def test_a_coarse_cut_that_is_refined_costs_hardly_more(monkeypatch):
     mesh = subdivide(make_creature("quadruped", n_vertices=3000))
     parts = find_parts(mesh)
