@@ -1,8 +1,16 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from eigenshape.shapes.creature_plans import PLANS, Limb, Z
-from eigenshape.shapes.limbs import BLEND, distance_to_body, nearest_limbs, place_limbs
+from eigenshape.shapes.limbs import (
+    BLEND,
+    distance_to_body,
+    distance_to_limb,
+    nearest_limbs,
+    place_limbs,
+)
 
 PLAN = [
     Limb("trunk", "", ((0, 0, 0, 0.2), (1, 0, 0, 0.2), (2, 0, 0, 0.2))),
@@ -30,6 +38,23 @@ def test_the_distance_is_that_to_a_tube_and_less_where_limbs_melt():
     np.testing.assert_allclose(distance_to_body(points, body), [0.3, 0, -0.2, 0.3], atol=1e-12)
     corner = np.array([[0.85, 0.25, 0.0]])  # 0.05 from the trunk and from the arm
     assert distance_to_body(corner, body)[0] == pytest.approx(0.05 - BLEND / 6)
+
+
+def test_a_piece_without_length_changes_no_distance():
+    points = np.array([[0.5, 0, 0.3], [-0.1, 0, 0.2], [0, 0, 0], [1, 0.2, 0.1], [0.1, 0.1, 0.1]])
+    ends = [[0, 0, 0, 0.1], [0.5, 0, 0, 0.2], [1, 0, 0, 0.1]]
+    limb, twice = (
+        replace(place_limbs([Limb("tube", "", ((0, 0, 0, 1), (1, 0, 0, 1)))]).limbs[0], pieces=rows)
+        for rows in (np.array(ends), np.array([ends[i] for i in (0, 0, 1, 1, 2, 2)]))
+    )
+    np.testing.assert_array_equal(
+        distance_to_limb(points, twice)[0], distance_to_limb(points, limb)[0]
+    )
+    ball = replace(limb, pieces=np.array(ends)[[0, 0]])
+    near = points[[1, 2, 4]]
+    np.testing.assert_allclose(
+        distance_to_limb(near, ball)[0], np.linalg.norm(near, axis=1) - 0.1, atol=1e-15
+    )
 
 
 def test_squashed_limbs_are_thin_along_an_axis():

@@ -8,6 +8,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 from certeig.kit.arrays import record
 from eigenshape.shapes.creature_plans import Limb, Swing
+from eigenshape.shapes.limb_loops import nearest_pieces
 
 # Limbs are blended where the difference of their distances is below this length (a creature is
 # about two units long). A larger value makes joints thicker and fuses limbs that are near each
@@ -136,10 +137,10 @@ def distance_to_body(points: Float[np.ndarray, "p 3"], body: Body) -> Float[np.n
     The distance to the nearest limb is reduced by a cubic in the differences to other limbs, which
     counts only limbs within BLEND of the nearest.
     """
-    distances = np.column_stack([distance_to_limb(points, limb)[0] for limb in body.limbs])
-    nearest = distances.min(axis=1)
-    blended = np.clip(1 - (distances - nearest[:, None]) / BLEND, 0, None) ** 3
-    return nearest - BLEND / 6 * (blended.sum(axis=1) - 1)
+    distances = np.stack([distance_to_limb(points, limb)[0] for limb in body.limbs])
+    nearest = distances.min(axis=0)
+    blended = np.clip(1 - (distances - nearest) / BLEND, 0, None) ** 3
+    return nearest - BLEND / 6 * (np.ascontiguousarray(blended.T).sum(axis=1) - 1)
 
 
 def nearest_limbs(
@@ -159,35 +160,17 @@ def distance_to_limb(
     Farther than 2 BLEND from the box around the limb, the distance to that box is returned.
     """
     centers, radii = limb.pieces[:, :3], limb.pieces[:, 3:]
-    low, high = (centers - radii).min(axis=0), (centers + radii).max(axis=0)
-    apart = np.linalg.norm(np.maximum(np.maximum(low - points, points - high), 0), axis=1)
-    place = np.zeros(len(points))
-    close = np.flatnonzero(apart < 2 * BLEND)
-    points = points[close]
-
-    # The piece with the nearest skin if cross-sections were round, and the position along it.
-    begins = centers[:-1]
-    along = np.diff(centers, axis=0)
-    length2 = np.square(along).sum(axis=1)
-    reach = _products(points, along) - (begins * along).sum(axis=1)
-    shares = np.clip(reach / length2, 0, 1)
-    # |p - b - s a|² is expanded, so that no array has the size points by pieces by coordinates.
-    apart2 = (
-        np.square(points).sum(axis=1)[:, None]
-        - 2 * _products(points, begins)
-        + np.square(begins).sum(axis=1)
-    )
-    apart2 += shares * (shares * length2 - 2 * reach)
-    widths = limb.pieces[:, 3]
-    to_skin = np.sqrt(np.maximum(apart2, 0)) - widths[:-1] - shares * np.diff(widths)
-    piece = to_skin.argmin(axis=1)
-    share = shares[np.arange(len(points)), piece]
+    box = np.stack([(centers - radii).min(axis=0), (centers + radii).max(axis=0)])
+    n, place = len(points), np.zeros(len(points))
+    (apart, *found), close, arm = np.empty((4, n)), np.empty(n, np.int64), np.empty((n, 3))
+    points = np.ascontiguousarray(points)
+    n_close = nearest_pieces(points, limb.pieces, box, 2 * BLEND, apart, close, arm, *found)
+    close, arm = close[:n_close], arm[:n_close]
+    radius, piece, share = (each[:n_close] for each in found)
     place[close] = (piece + share) / PIECES_PER_SEGMENT
 
     # The distance to the cross-section, a superellipsoid, to first order: the value of the norm
     # that defines it, minus the radius, divided by its slope.
-    center = limb.pieces[piece] + share[:, None] * (limb.pieces[piece + 1] - limb.pieces[piece])
-    arm, radius = points - center[:, :3], center[:, 3]
     if limb.power == 2 and (limb.squash == 1).all():
         apart[close] = np.sqrt(np.einsum("ij,ij->i", arm, arm)) - radius
         return apart, place
@@ -196,11 +179,3 @@ def distance_to_limb(
     slope = np.linalg.norm((scaled / size[:, None]) ** (limb.power - 1) / limb.squash, axis=1)
     apart[close] = (size - radius) / np.maximum(slope, 0.5)
     return apart, place
-
-
-def _products(
-    one: Float[np.ndarray, "p 3"], two: Float[np.ndarray, "s 3"]
-) -> Float[np.ndarray, "p s"]:
-    # A matrix product by BLAS may change its last digits with the number of threads; einsum does
-    # not.
-    return np.einsum("pi,si->ps", one, two)
