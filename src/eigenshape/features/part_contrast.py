@@ -37,7 +37,7 @@ THICKNESS_WEIGHT = 0.5
 LOG_CONTRAST = 0.25
 # Factor by which the persistence of one end of a body is raised at most to that of the other end.
 # With 1.15 to 1.3 the error on the tuning half is 0.001 lower than with 1; from 1.2 on, both ends
-# of the metacarpal bones and phalanges of one hand are parts.
+# of the metacarpal bones and proximal phalanges of one hand are parts.
 ALIKE_ENDS = 1.25
 # Half width of the strip in which a boundary's turn is measured, as a share of √area: about an
 # edge of a mesh of 5,000 vertices.
