@@ -123,6 +123,7 @@ def test_triangles_that_stay_turned_over_are_refused(monkeypatch):
         map_to_sphere(es.icosphere(1))
 
 
+@pytest.mark.long
 @pytest.mark.data
 def test_a_head_with_thin_triangles_maps_to_the_sphere(data, monkeypatch):
     head = es.read_mesh(data / "classics" / "decimated-max.obj")

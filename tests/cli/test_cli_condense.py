@@ -23,6 +23,7 @@ def shapes(tmp_path):
     return folder
 
 
+@pytest.mark.long
 def test_a_table_has_the_regions_of_all_shapes(shapes, tmp_path):
     output = tmp_path / "table.csv"
     found = run_json("condense", shapes, "--times", "0.1,0.3", "-n", 30, "-o", output, code=3)
@@ -46,6 +47,7 @@ def test_a_table_has_the_regions_of_all_shapes(shapes, tmp_path):
     assert table["log_heat_0.3"].to_pylist() == regions.values[:, 1].tolist()
 
 
+@pytest.mark.long
 def test_too_few_modes_are_named(shapes, tmp_path):
     done = run(
         "condense", shapes / "one.ply", "--times", "0.001", "-n", 9, "-o", tmp_path / "t.csv"

@@ -229,6 +229,7 @@ def test_each_patch_turns_about_the_middle_of_its_own_boundary(tmp_path):
         np.testing.assert_allclose(sorted(found), pivots, atol=1e-12)
 
 
+@pytest.mark.long
 def test_an_island_of_a_region_is_named_once(tmp_path):
     path, region = tmp_path / "ball.ply", tmp_path / "region.txt"
     ball = icosphere(3)
@@ -274,6 +275,7 @@ def torn(before, after):
     return sum(len(np.unique(where[corners == place], axis=0)) > 1 for place in np.unique(corners))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("suffix", [".obj", ".glb"])
 def test_a_textured_character_does_not_tear_along_its_seams(textured, tmp_path, suffix):
     path, n_joined = textured

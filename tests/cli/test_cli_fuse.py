@@ -35,6 +35,7 @@ def test_frames_are_fused_and_a_stranger_is_named(scans, tmp_path):
     assert "ball.ply fits no other scan" in done.stderr
 
 
+@pytest.mark.long
 def test_all_that_fits_is_done(scans, tmp_path):
     output = tmp_path / "one.ply"
     done = CliRunner().invoke(app, ["fuse", str(scans[0]), "-o", str(output)])

@@ -8,6 +8,7 @@ import eigenshape as es
 pytest.importorskip("netgen.meshing", reason="the extra tetrahedralize is missing")
 
 
+@pytest.mark.long
 def test_tetrahedra_are_written_and_have_a_spectrum(tmp_path):
     es.write_mesh(es.icosphere(2), tmp_path / "ball.ply")
     done = run("tetrahedralize", tmp_path / "ball.ply", "-o", tmp_path / "ball.vtu")

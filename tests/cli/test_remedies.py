@@ -204,6 +204,7 @@ def test_a_scan_of_uneven_spacing_is_answered(tmp_path):
     assert asked == (None, {"--operator": "robust"})
 
 
+@pytest.mark.long
 @pytest.mark.data
 @pytest.mark.parametrize("name", ["mice/WSB.ply", "nasty/pymesh/quad_s1.obj"])
 def test_missing_vertices_and_planes_are_answered(data, name):
@@ -211,6 +212,7 @@ def test_missing_vertices_and_planes_are_answered(data, name):
         assert answer(verb, data / name)[0] is None
 
 
+@pytest.mark.long
 @pytest.mark.data
 def test_a_cloud_that_becomes_no_surface_has_a_spectrum(data):
     path = data / "points" / "fragment_000.ply"

@@ -206,6 +206,7 @@ class StoppedError(Exception):
     """Raised in the middle of a build, as Ctrl-C is."""
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("step", [4, 7, 10, 11])
 def test_a_stopped_build_with_another_template_leaves_the_last_collection(
     scans, built, copy, step, fresh_of, quick
@@ -249,6 +250,7 @@ def test_a_file_that_changes_while_it_is_fitted_is_a_failure(scans, copy, quick)
     assert "A file must not change while it is fitted" in found.failures["extra"]
 
 
+@pytest.mark.long
 def test_two_builds_at_once_are_both_right(scans, copy, fresh_of, quick):
     other = "ball 1"
 

@@ -8,6 +8,7 @@ import eigenshape as es
 from eigenshape.collections import surface_fit
 
 
+@pytest.mark.long
 def test_a_specimen_is_bent_onto_another_in_place():
     source, truth = make_specimen(0), make_specimen(1)
     fit = es.collections.fit_surface(source, move(truth, 10.0))
@@ -19,6 +20,7 @@ def test_a_specimen_is_bent_onto_another_in_place():
     assert fit.missing == fit.excess == 0
 
 
+@pytest.mark.long
 def test_more_points_in_the_last_level_bring_a_surface_nearer():
     source, truth = make_specimen(0), make_specimen(1)
     placing = es.collections.align_surfaces(truth, source)

@@ -315,6 +315,7 @@ def test_folds_of_single_edges_take_a_strong_pull(halves):
     assert not len(self_intersections(apart))
 
 
+@pytest.mark.long
 def test_what_no_pull_keeps_apart_is_said(halves):
     """A half that is turned into the other half: both are held."""
     rig, left, pivot = halves

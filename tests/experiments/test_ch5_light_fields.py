@@ -129,6 +129,7 @@ def test_a_turn_of_the_dodecahedron_is_no_difference():
     )
 
 
+@pytest.mark.long
 @few
 @given(st.integers(0, 2**32 - 1))
 def test_any_turn_is_less_than_another_shape(seed):

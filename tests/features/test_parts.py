@@ -53,6 +53,17 @@ def test_a_dumbbell_has_two_parts_and_the_cut_is_at_the_neck():
     assert agree[np.abs(centers) > 0.15].all()
 
 
+def test_both_ends_of_a_bone_are_parts():
+    ball = icosphere(4)
+    x, y, z = ball.vertices.T
+    width = 1 + 2 * np.exp(-(((z - 1) / 0.4) ** 2)) + 1.5 * np.exp(-(((z + 1) / 0.4) ** 2))
+    bone = TriangleMesh(np.column_stack([width * x, width * y, 4 * z]), ball.faces)
+    labels = find_parts(bone).parts.labels
+    heights = bone.vertices[bone.faces].mean(axis=1)[:, 2]
+    top, middle, bottom = (labels[np.abs(heights - at).argmin()] for at in (3.5, 0, -3.5))
+    assert len(np.unique(labels)) == len({top, middle, bottom}) == 3
+
+
 def test_a_ball_is_one_part():
     assert len(find_parts(icosphere(3)).parts.features.vertices) == 1
 
@@ -253,6 +264,7 @@ def network_of(mesh):
     return boundaries.build_network(mesh, tensors)
 
 
+@pytest.mark.long
 def test_a_coarse_cut_that_is_refined_costs_hardly_more(monkeypatch):
     mesh = subdivide(make_creature("quadruped", n_vertices=3000))
     parts = find_parts(mesh)

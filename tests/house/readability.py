@@ -37,25 +37,25 @@ def print_counts() -> None:
     print(f"modules in the largest folder, {folder.relative_to(ROOT)}: {n_modules}")
 
 
-def code_tokens(text: str) -> list[tokenize.TokenInfo]:
-    """Return the tokens of code, without those of docstrings."""
-    docstrings = docstring_lines(ast.parse(text))
+def code_tokens(text: str, *, with_imports: bool = True) -> list[tokenize.TokenInfo]:
+    """Return the tokens of code, without those of docstrings and, on request, of imports."""
+    left_out: set[int] = set()
+    documented = ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, documented) and ast.get_docstring(node, clean=False):
+            left_out |= lines_of(node.body[0])
+        elif isinstance(node, ast.Import | ast.ImportFrom) and not with_imports:
+            left_out |= lines_of(node)
     return [
         token
         for token in tokenize.generate_tokens(io.StringIO(text).readline)
-        if token.type not in NO_CODE and token.string and token.start[0] not in docstrings
+        if token.type not in NO_CODE and token.string and token.start[0] not in left_out
     ]
 
 
-def docstring_lines(tree: ast.Module) -> set[int]:
-    """Return the lines that docstrings stand on."""
-    lines: set[int] = set()
-    documented = ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef
-    for node in ast.walk(tree):
-        if isinstance(node, documented) and ast.get_docstring(node):
-            first = node.body[0]
-            lines |= set(range(first.lineno, (first.end_lineno or first.lineno) + 1))
-    return lines
+def lines_of(node: ast.stmt) -> set[int]:
+    """Return the numbers of the lines that a statement stands on."""
+    return set(range(node.lineno, (node.end_lineno or node.lineno) + 1))
 
 
 def comments_in_functions(text: str) -> int:
@@ -63,7 +63,7 @@ def comments_in_functions(text: str) -> int:
     inside: set[int] = set()
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.FunctionDef):
-            inside |= set(range(node.lineno, (node.end_lineno or node.lineno) + 1))
+            inside |= lines_of(node)
     found = tokenize.generate_tokens(io.StringIO(text).readline)
     return sum(token.type == tokenize.COMMENT and token.start[0] in inside for token in found)
 

@@ -499,6 +499,7 @@ def volume_errors(data, name, message, tmp_path):
         read_volume(tmp_path / name)
 
 
+@pytest.mark.long
 def test_volumes_that_lie_are_refused(tmp_path):
     nib.Nifti1Image(np.ones((2, 3, 4), np.int16), np.eye(4)).to_filename(tmp_path / "a.nii")
     good = (tmp_path / "a.nii").read_bytes()

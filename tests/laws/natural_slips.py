@@ -308,6 +308,7 @@ VALUES: dict[Any, Callable[[], Any]] = {
     es.plot.Panel: lambda: es.plot.Panel(body(), "body", labels(), np.arange(3)),
     es.retrieval.LabeledShape: lambda: es.retrieval.LabeledShape(body(), labels()),
     es.matching.Outfit: lambda: es.matching.transfer(worn_attributes(), body()),
+    es.features.PartDecomposition: lambda: es.find_parts(body()),
     es.retrieval.LabelTransfer: lambda: es.transfer_labels(
         es.retrieval.LabeledShape(body(), labels()), body()
     ),

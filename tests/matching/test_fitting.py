@@ -128,6 +128,7 @@ def grown(surfaces):
     return plan, differences, grow_maps(plan, differences)
 
 
+@pytest.mark.long
 def test_more_starts_fit_no_worse_and_are_sorted(grown):
     plan, differences, more = grown
     maps = fitted_maps(plan, differences)
@@ -142,6 +143,7 @@ def test_a_search_ends_early_if_no_rough_bend_fits_well(grown):
     assert grow_maps(plan, differences, wanted=0.0) == []
 
 
+@pytest.mark.long
 def test_a_search_in_a_coarse_part_ends_early_if_no_first_map_fits_well(surfaces):
     """All vertices are points: there rough bends say nothing."""
     pose, whole = surfaces
@@ -166,6 +168,7 @@ def test_a_search_ends_early_if_the_first_maps_are_the_known_one(surfaces):
     assert set(misfits) <= {one.fit.misfit for one in every}
 
 
+@pytest.mark.long
 def test_the_best_map_is_smoothed_and_slides(grown):
     plan, differences, maps = grown
     modes = lowest_modes(plan.whole.mesh)

@@ -34,6 +34,7 @@ def frames(whole, motions):
     return found
 
 
+@pytest.mark.long
 def test_a_frame_is_placed_on_the_next(frames, motions, whole):
     found = es.matching.register_scans(frames[0], frames[1])
     assert found.score > LEAST_SCORE

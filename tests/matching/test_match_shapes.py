@@ -109,6 +109,7 @@ def test_each_piece_is_matched_by_itself(target):
     assert np.median(found) < 6
 
 
+@pytest.mark.long
 def test_a_speck_beside_a_part_goes_where_its_neighbors_go_and_is_not_sure(target, cut):
     corner = cut.mesh.vertices[:1]
     speck = corner + 1e-3 * np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])

@@ -59,6 +59,7 @@ def read_back(path):
     }
 
 
+@pytest.mark.long
 def test_the_same_character_remeshed(worn, tmp_path):
     mesh, joints, _, weights = rig("biped", 2600)
     outfit = es.matching.transfer(worn, mesh)

@@ -81,6 +81,7 @@ def test_groups_are_compared_by_all_divisions_of_both():
         morpho.compare_groups(shapes[:4], list("aaab"))
 
 
+@pytest.mark.long
 def test_groups_that_do_not_differ_have_all_p_values_and_those_that_do_small_ones():
     p_values = []
     for seed in range(12):

@@ -143,6 +143,7 @@ def test_other_triangles_keep_below_the_constant_of_all(apex):
     assert proved_constant(corners, 40, lambda mesh: 0.3496 * longest_edges(mesh)) < TRIANGLE
 
 
+@pytest.mark.long
 def test_the_constant_of_the_regular_tetrahedron_is_proved_from_that_of_any():
     def any_shape(mesh):
         return 0.3312 * longest_edges(mesh)

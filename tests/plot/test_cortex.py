@@ -24,6 +24,7 @@ def middle(axes, column):
     return np.asarray(image[len(image) // 2, int(column * image.shape[1])])
 
 
+@pytest.mark.long
 def test_four_views_with_one_scale():
     figure = figure_cortex(HALVES, MAPS, "front, mm", color_map="gray")
     *views, bar = figure.axes
@@ -50,6 +51,7 @@ def test_one_hemisphere_and_what_has_no_value():
     assert figure.axes[-1].get_ylim() == (0, 1)
 
 
+@pytest.mark.long
 def test_parcels_have_their_own_colors():
     parcels = Parcellation(np.where(EGG[:, 1] > 0.2, 0, -1), ("front",), [[1, 0, 0, 1]])
     figure = figure_cortex(HALVES, {"left": parcels, "right": parcels})

@@ -196,6 +196,7 @@ def test_figures_take_lists_and_refuse_what_does_not_fit_the_mesh():
         value_colors([0.0, np.nan])
 
 
+@pytest.mark.long
 def test_vertices_without_a_value_are_gray_and_the_bar_says_so():
     mesh = icosphere(2)
     values = mesh.vertices[:, 0].copy()

@@ -102,6 +102,7 @@ def test_poses_differ_to_the_eye(kind):
     assert max(way.max() for way in moved) > 0.15 * size
 
 
+@pytest.mark.long
 @each_kind
 def test_poses_hardly_run_through_themselves(kind):
     for pose in POSES[:4]:

@@ -58,6 +58,8 @@ def test_no_change_exceeds_weyls_bound_and_none_of_these_ours(bulged):
         assert change.admissible
     times = [change.t for change in bulged.changes]
     assert times == pytest.approx(np.geomspace(bulged.times.low, bulged.times.high, 4))
+    # Each heat time has Laplacians of its own.
+    assert len({change.change for change in bulged.changes}) == len(times)
 
 
 def test_a_report_can_be_read(bulged):

@@ -35,6 +35,10 @@ TURN_WEIGHT = 0.6
 THICKNESS_WEIGHT = 0.5
 # Log contrast of parts that people see as often as not.
 LOG_CONTRAST = 0.25
+# Factor by which the persistence of one end of a body is raised at most to that of the other end.
+# With 1.15 to 1.3 the error on the tuning half is 0.001 lower than with 1; from 1.2 on, both ends
+# of the metacarpal bones and phalanges of one hand are parts.
+ALIKE_ENDS = 1.25
 # Half width of the strip in which a boundary's turn is measured, as a share of √area: about an
 # edge of a mesh of 5,000 vertices.
 TURN_REACH = 0.02
@@ -83,6 +87,10 @@ def weigh_parts(
     within convex parts and between parts of one convex body (Asafi, Goren and Cohen-Or 2013, who
     ask whether whole lines are inside). Parts of one thickness with no crease between them, such as
     the halves of a wall, merge earlier than by heat alone.
+
+    A body that has absorbed one of two ends is larger, so that the odds of the other end rise. If
+    both ends were about as clear before (a factor of 1.25), and the other end is the next to merge,
+    the persistence of the first is raised to that of the other, by this factor at most.
 
     Parameters
     ----------
@@ -278,6 +286,10 @@ def _merge_by_contrast(parts: _Parts, fine: Segmentation) -> list[Merge]:
     borders, rows, lines, clear = parts.borders, parts.rows, parts.lines, parts.clear
     scale = PART_CONTRAST / (1 - PART_CONTRAST) * np.exp(-LOG_CONTRAST)
 
+    prices: dict[int, float] = {}  # at which regions ended
+    # For each body, the region that it absorbed last, and its other ends that were then as clear
+    absorbed: dict[int, tuple[int, set[int]]] = {}
+
     def contrast(one: int, two: int) -> float:
         share = areas[one] * areas[two] / (areas[one] + areas[two])
         gap = np.square(means[one] - means[two]).sum()
@@ -295,6 +307,23 @@ def _merge_by_contrast(parts: _Parts, fine: Segmentation) -> list[Merge]:
         return float(odds / (1 + odds))
 
     def join(remains: int, ends: int) -> None:
+        price = prices[ends] = contrast(remains, ends)
+        pair = (remains, ends), (ends, remains)
+        # Both ends of a bone are about as clear. As soon as the shaft has absorbed one, it is larger,
+        # and the other end is clearer: then the first end counts nearly as much.
+        for body, other in pair:
+            end, alike = absorbed.pop(body, (-1, set()))
+            if other in alike:
+                prices[end] = min(price, ALIKE_ENDS * prices[end])
+        absorbed[remains] = (
+            ends,
+            {
+                other
+                for body, end in pair
+                for other in borders[body].keys() - borders[end].keys() - {end}
+                if contrast(body, other) <= ALIKE_ENDS * price
+            },
+        )
         join_means(areas, means, remains, ends)
         for sums in (sampled, logs):
             sums[remains] += sums[ends]
@@ -311,4 +340,7 @@ def _merge_by_contrast(parts: _Parts, fine: Segmentation) -> list[Merge]:
                 borders[remains][other] = borders[remains].get(other, 0) + both
                 borders[other][remains] = borders[remains][other]
 
-    return merge_cheapest(parts.adjacent, fine.features.values, contrast, join, FINE_CONTRAST)
+    heights = fine.features.values
+    merges = merge_cheapest(parts.adjacent, heights, contrast, join, FINE_CONTRAST)
+    raised = [(ends, remains, max(price, prices[ends])) for ends, remains, price in merges]
+    return sorted(raised, key=lambda merge: merge[2])

@@ -65,7 +65,7 @@ class PartDecomposition(ReadOnly):
     >>> import eigenshape as es
     >>> found = es.find_parts(es.make_creature("biped", n_vertices=1200))
     >>> len(found.parts.features.vertices), found.heat.shape
-    (8, (1200,))
+    (9, (1200,))
     """
 
     mesh: TriangleMesh
@@ -120,7 +120,8 @@ def find_parts(
     minima rule of Hoffman and Richards 1984), r is the radius of the inscribed balls (Shapira,
     Shamir and Cohen-Or 2008), and v_RS is the share of the short lines between points of R and S
     that run inside the solid at both ends (Asafi, Goren and Cohen-Or 2013). The tree is cut where
-    o / (1 + o) is 0.3. All times and lengths are relative to the surface area, so the result does
+    o / (1 + o) is 0.3; of two ends of a body that are about as clear, such as those of a long bone,
+    where the clearer one has it. All times and lengths are relative to the surface area, so the result does
     not depend on the unit of length.
 
     A closed body may have parts that rise from flat ledges behind concave creases, such as the

@@ -104,6 +104,7 @@ def test_lattice_triangles_are_told_as_by_fractions(seed, side, shift):
     assert_as_by_fractions(vertices, rng.integers(0, 12, (14, 3)))
 
 
+@pytest.mark.long
 @settings(max_examples=20, deadline=None)
 @given(st.integers(0, 2**32 - 1))
 def test_flat_lattice_triangles_are_told_as_by_fractions(seed):
@@ -143,6 +144,7 @@ def test_details_of_any_size_are_told_as_by_fractions(seed):
     assert_as_by_fractions(vertices, np.array([rng.permutation(15)[:3] for _ in range(14)]))
 
 
+@pytest.mark.long
 def test_lattices_and_rounded_lattices_do_cross_and_do_not():
     """What the laws above draw is worth drawing: many pairs of each kind."""
     rng, found = np.random.default_rng(0), 0

@@ -125,6 +125,7 @@ def test_open_and_one_sided_pieces_are_left_and_hold_nothing():
     assert depths(opened, ball(0.5)) == [0, 0]
 
 
+@pytest.mark.long
 def test_thousands_of_pieces_are_quick():
     rng = np.random.default_rng(1)
     places = rng.uniform(-0.5, 0.5, (3000, 3))

@@ -48,6 +48,7 @@ def test_the_same_surface_gives_the_same_tetrahedra():
     assert np.array_equal(one.simplices, two.simplices)
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("netgen")
 def test_a_side_length_makes_more():
     whole, fine = fine_solid(), tetrahedralize(FINE_BALL, 0.15)

@@ -30,6 +30,7 @@ CASES = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", CASES)
 def test_vertices_stay_in_place_and_topology_stays(name):
     make, wanted = CASES[name]

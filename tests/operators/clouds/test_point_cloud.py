@@ -63,6 +63,7 @@ def test_the_defaults_are_more_accurate_than_the_thesis_form():
         assert sphere_error(points) < 0.5 * sphere_error(points, **THESIS)
 
 
+@pytest.mark.long
 def test_errors_on_random_points_decrease_with_their_number():
     clouds = [random_sphere(n, rng=np.random.default_rng(2)).vertices for n in (800, 3200)]
     few, many = (sphere_error(points) for points in clouds)

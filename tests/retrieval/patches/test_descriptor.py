@@ -81,6 +81,7 @@ def test_an_index_scores_as_the_function_does(index, recipe, meshes):
     )
 
 
+@pytest.mark.long
 def test_rounding_hardly_turns_a_code(recipe, meshes):
     codes = encode_patches(surface_patches(meshes["octopus"]), recipe.codebook)
     whole = round_codes(codes, CLIP).astype(float)

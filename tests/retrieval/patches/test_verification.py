@@ -64,6 +64,7 @@ def test_only_the_nearest_come_nearer(wholes, scan):
     assert verified_scores(scan, wholes.__getitem__, np.ones(4)).argmin() == 1
 
 
+@pytest.mark.long
 def test_the_nearest_view_of_the_query_serves_against_a_part(wholes, scan):
     whole = wholes[1]
     own = patch_agreement(scan.points[0], whole.points[0])

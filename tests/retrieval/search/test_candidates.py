@@ -128,6 +128,7 @@ def test_faiss_supplies_candidates(source):
     check_engine(source, engines.FaissEngine(coarse), coarse)
 
 
+@pytest.mark.long
 @pytest.mark.filterwarnings("ignore")  # of the client, on its local mode
 def test_qdrant_supplies_candidates(source):
     client = pytest.importorskip("qdrant_client").QdrantClient(":memory:")

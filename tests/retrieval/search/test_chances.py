@@ -23,14 +23,13 @@ def test_chances_grow_with_scores():
 
 def test_the_best_score_tells_whether_anything_is_alike():
     scores = np.array([0.9, 0.4, 0.8])
-    assert nothing_alike(scores, 100, is_closed=True)
-    assert not nothing_alike(scores, 100, is_closed=False)  # a scan scores worse
-    assert not nothing_alike(scores, 10, is_closed=True)  # the best of few shapes, too
-    assert not nothing_alike(np.append(scores, 0.2), 100, is_closed=True)
+    assert nothing_alike(scores, 100)
+    assert not nothing_alike(scores, 10)  # the best of few shapes scores worse
+    assert not nothing_alike(np.append(scores, 0.2), 100)
 
 
 def test_an_empty_answer_has_nothing_alike():
-    assert nothing_alike(np.empty(0), 0, is_closed=True)
+    assert nothing_alike(np.empty(0), 0)
 
 
 def test_classes_share_one_with_those_that_were_not_found():

@@ -166,6 +166,7 @@ def test_scans(data, name):
     np.testing.assert_allclose(found.eigenvalues, exact.eigenvalues, atol=2e-4 * scale)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("options", [{}, {"accuracy": 1e-2}, {"max_residual": 1e-9}])
 def test_up_to_100_000_points_pairs_are_certified(monkeypatch, options):
     monkeypatch.undo()

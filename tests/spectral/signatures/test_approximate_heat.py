@@ -74,6 +74,7 @@ def test_the_error_falls_with_the_accuracy():
     assert true[1] < 1e-3
 
 
+@pytest.mark.long
 def test_pairs_that_are_good_enough_are_not_refined(monkeypatch):
     def refuse(*_):
         raise AssertionError("refined")

@@ -104,6 +104,7 @@ def test_filters_and_factors_find_the_same_spectrum(monkeypatch, k):
     assert filtered.certificate.clusters == factored.certificate.clusters
 
 
+@pytest.mark.long
 def test_what_filters_cannot_prove_factors_do(monkeypatch):
     laplacian = mesh_laplacian(icosphere(4))
 

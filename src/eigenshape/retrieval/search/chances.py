@@ -12,10 +12,11 @@ from jaxtyping import Float
 # 0.29 this extrapolates.
 SCORES = (0.0, 0.29, 0.305, 0.322, 0.355, 0.381, 0.414, 0.469, 0.541, 0.734, 0.861, 0.991, 1.35)
 SHARES = (1e-6, 5e-4, 1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 0.9, 1.0)
-# Best score above which a closed, or an open, query has nothing alike: 5 % of right first matches
-# among 145 shapes lie above. The best of more shapes is better by chance: the threshold falls by a
+# Best score above which a query has nothing alike: where the share of queries without their class
+# that are missed equals that of right first matches that are warned of (12 % each), of closed and
+# open queries together. The best of more shapes is better by chance: the threshold falls by a
 # factor n^-0.1, which keeps the share of false alarms among 15 and 40 shapes.
-LARGEST_CLOSED, LARGEST_OPEN = 0.371, 0.475
+LARGEST_SCORE = 0.35
 AT_SHAPES, GROWTH = 100, 0.1
 # Of the probability of a class, by maximum likelihood: a match of this score weighs as much as all
 # classes that were not found, and the weight of a match and of a class is a power of it.
@@ -29,7 +30,7 @@ def chances(scores: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
     return np.asarray(np.exp(np.interp(scores, SCORES, np.log(SHARES))))
 
 
-def nothing_alike(scores: Float[np.ndarray, " k"], n_shapes: int, *, is_closed: bool) -> bool:
+def nothing_alike(scores: Float[np.ndarray, " k"], n_shapes: int) -> bool:
     """Return whether the best score of a query is no better than those of unrelated shapes.
 
     Parameters
@@ -38,13 +39,10 @@ def nothing_alike(scores: Float[np.ndarray, " k"], n_shapes: int, *, is_closed: 
         The best scores of a query, in any order.
     n_shapes : int
         Number of shapes that they are the best of.
-    is_closed : bool
-        Whether the query is a whole shape.
     """
     if not len(scores):
         return True
-    largest = LARGEST_CLOSED if is_closed else LARGEST_OPEN
-    return bool(scores.min() > largest * (AT_SHAPES / n_shapes) ** GROWTH)
+    return bool(scores.min() > LARGEST_SCORE * (AT_SHAPES / n_shapes) ** GROWTH)
 
 
 def class_chances(scores: Sequence[float], labels: Sequence[str | None]) -> dict[str, float]:

@@ -88,6 +88,5 @@ def search_candidates(
         matches.append(match)
     nothing = False
     if isinstance(descriptor, PatchDescriptor):
-        is_closed = len(descriptor.codes) > 1
-        nothing = nothing_alike(scores, candidates.n_shapes, is_closed=is_closed)
+        nothing = nothing_alike(scores, candidates.n_shapes)
     return Matches(tuple(matches), candidates.method, len(places), candidates.n_shapes, nothing)
