@@ -134,8 +134,12 @@ def foot(pose: int, other: int, limb: int, individual: int) -> dict[str, object]
     whole = es.make_creature("quadruped", other, n_vertices=3000, individual=individual)
     rest = es.make_creature("quadruped", 0, n_vertices=3000)
     low = rest.vertices[:, 1] < rest.vertices[:, 1].min() + 0.05
-    x, z = rest.vertices[:, 0], rest.vertices[:, 2]
-    inside = low & ((x > 0) == (limb % 2 == 0)) & ((z > np.median(z[low])) == (limb < 2))
+    middle = np.median(rest.vertices[low, 2])
+
+    def beside(points: np.ndarray) -> np.ndarray:
+        return ((points[:, 0] > 0) == (limb % 2 == 0)) & ((points[:, 2] > middle) == (limb < 2))
+
+    inside = low & beside(rest.vertices)
     tip = int(np.flatnonzero(inside)[np.argmin(rest.vertices[inside, 1])])
     away = es.geometry.geodesic_distances(one, [tip])[0]
     areas = es.geometry.dual_volumes(one)
@@ -145,6 +149,8 @@ def foot(pose: int, other: int, limb: int, individual: int) -> dict[str, object]
     vertices, numbers = np.unique(one.faces[kept], return_inverse=True)
     part = es.TriangleMesh(one.vertices[vertices], numbers.reshape(-1, 3))
     match = es.match_shapes(part, whole, scale="known")
+    if individual:  # another individual has other faces, so that only the leg is known
+        return {"right": float(beside(match.pull(whole.vertices)).mean()), **said(match)}
     return right(match, whole, whole.vertices[vertices])
 
 
