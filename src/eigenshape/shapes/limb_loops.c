@@ -39,28 +39,31 @@ static int64_t gather_close(const struct place *points, const struct place box[2
     return n_close;
 }
 
-KERNEL int64_t nearest_pieces(const struct place *points, const struct end *ends,
-                              const struct place *box, double reach, double *apart, int64_t *close,
-                              struct place *arms, double *radii, double *pieces, double *shares,
+KERNEL int64_t nearest_pieces(const double (*points)[3], const double (*ends)[4],
+                              const double (*box)[3], double reach, double *apart, int64_t *close,
+                              double (*arms)[3], double *radii, double *pieces, double *shares,
                               int64_t n_points, int64_t n_ends) {
-    int64_t n = gather_close(points, box, reach, arms, close, apart, n_points);
+    const struct end *joints = (const struct end *)ends;
+    struct place *from_axis = (struct place *)arms;
+    int64_t n = gather_close((const struct place *)points, (const struct place *)box, reach,
+                             from_axis, close, apart, n_points);
     for (int64_t i = 0; i < n; i++) {
         radii[i] = INFINITE; /* the distance to the nearest skin, until the end */
         pieces[i] = shares[i] = 0;
     }
     /* One piece is compared with all points after the other: so several points are computed at once. */
     for (int64_t piece = 0; piece + 1 < n_ends; piece++) {
-        struct end begin = ends[piece];
-        struct place along = difference(ends[piece + 1].center, begin.center);
+        struct end begin = joints[piece];
+        struct place along = difference(joints[piece + 1].center, begin.center);
         double length2 = own_product(along, along), from = own_product(begin.center, along);
         double begin2 = own_product(begin.center, begin.center);
-        double widening = ends[piece + 1].radius - begin.radius;
+        double widening = joints[piece + 1].radius - begin.radius;
         for (int64_t i = 0; i < n; i++) {
             /* |p - b - s a|² is expanded: fewer steps for each piece. */
-            double dot = product(arms[i], along) - from;
+            double dot = product(from_axis[i], along) - from;
             double share = minimum(maximum(dot / length2, 0), 1);
-            double apart2 = own_product(arms[i], arms[i]);
-            apart2 = apart2 - 2 * product(arms[i], begin.center) + begin2;
+            double apart2 = own_product(from_axis[i], from_axis[i]);
+            apart2 = apart2 - 2 * product(from_axis[i], begin.center) + begin2;
             apart2 += share * (share * length2 - 2 * dot);
             double skin = square_root(maximum(apart2, 0)) - begin.radius - share * widening;
             bool is_nearer = skin < radii[i]; /* false if the piece has no length: 0 / 0 */
@@ -70,12 +73,12 @@ KERNEL int64_t nearest_pieces(const struct place *points, const struct end *ends
         }
     }
     for (int64_t i = 0; i < n; i++) {
-        const struct end *at = &ends[(int64_t)pieces[i]];
+        const struct end *at = &joints[(int64_t)pieces[i]];
         struct place along = difference(at[1].center, at->center);
         struct place center = {at->center.x + shares[i] * along.x,
                                at->center.y + shares[i] * along.y,
                                at->center.z + shares[i] * along.z};
-        arms[i] = difference(arms[i], center);
+        from_axis[i] = difference(from_axis[i], center);
         radii[i] = at->radius + shares[i] * (at[1].radius - at->radius);
     }
     return n;
