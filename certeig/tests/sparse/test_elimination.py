@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from known_spectra import adjacency, kronecker_sum, laplacian, random_symmetric, surface
 
-from certeig.sparse import dissection
+from certeig.sparse.dissection_loops import narrow_cut
 from certeig.sparse.elimination import analyze_pattern
 from certeig.sparse.front_loops import WIDE
 from certeig.sparse.symmetric_factor import SymmetricFactor
@@ -157,12 +157,30 @@ def test_the_bound_of_rounding_is_that_of_the_factor_in_any_unit():
 
 
 @settings(max_examples=60, deadline=None)
-@given(st.integers(1, 9), st.integers(1, 9), st.floats(0, 1), st.integers(0, 10**6))
-def test_the_smallest_cover_meets_all_edges(n_rows, n_columns, density, seed):
-    edges = np.random.default_rng(seed).random((n_rows, n_columns)) < density
-    outside, columns = dissection._cover_edges(sp.csr_array(edges.astype(float)))
-    assert not np.delete(edges[outside], columns, axis=1).any()
-    # No smaller set of rows and columns does (brute force over the rows).
-    rows = [np.array(each, dtype=bool) for each in itertools.product([0, 1], repeat=n_rows)]
+@given(st.integers(1, 9), st.integers(1, 9), st.floats(0.05, 1), st.integers(0, 10**6))
+def test_a_cut_is_narrowed_to_the_fewest_points(n_cut, n_beside, density, seed):
+    edges = np.random.default_rng(seed).random((n_cut, n_beside)) < density
+    edges[0, 0] = True
+    # The cut, the points beside it on one side, and many more, which are joined to these or the cut.
+    sizes = n_cut, n_beside, 200, 200
+    side = np.repeat(np.array([2, 0, 0, 1], dtype=np.int8), sizes)
+    n, cut, beside = len(side), slice(n_cut), slice(n_cut, n_cut + n_beside)
+    graph = np.zeros((n, n), dtype=bool)
+    graph[cut, beside] = edges
+    graph[beside, n_cut + n_beside : -200] = graph[cut, -200:] = True
+    pattern = sp.csr_array(graph | graph.T)
+    scratch = np.empty((4, n), dtype=np.int64)
+    narrow_cut(
+        pattern.indptr.astype(np.int64),
+        pattern.indices.astype(np.int64),
+        np.arange(n),
+        np.ones(n, dtype=np.int64),
+        1,
+        *scratch,
+        side,
+    )
+    assert not pattern[side == 0][:, side == 1].nnz
+    # No smaller set of rows and columns meets all edges (brute force over the rows).
+    rows = [np.array(each, dtype=bool) for each in itertools.product([0, 1], repeat=n_cut)]
     smallest = min(int(each.sum() + edges[~each].any(axis=0).sum()) for each in rows)
-    assert n_rows - len(outside) + len(columns) == smallest
+    assert np.count_nonzero(side == 2) == smallest

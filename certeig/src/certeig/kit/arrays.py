@@ -16,6 +16,7 @@ from certeig.kit.text import Shown
 from certeig.kit.typing import ArrayLike, Integer
 
 EPS = float(np.finfo(np.float64).eps)  # rounding of a number near 1, relative
+TINY = float(np.finfo(np.float64).tiny)  # least number of full precision, to divide by instead of 0
 # Share of the memory of the machine that one array may take while it is checked and copied. A
 # larger share would leave too little for the computation.
 SHARE_OF_ARRAYS = 0.5

@@ -1,14 +1,9 @@
-"""Where SciPy's BLAS lies in memory, for kernels that call it on parts of arrays in place."""
+"""Where SciPy's BLAS and LAPACK lie in memory, for kernels that call it on parts of arrays in place."""
 
 import ctypes
 from functools import cache
 
-from scipy.linalg import cython_blas
-
-
-def blas_routines() -> tuple[int, int]:
-    """Return the addresses of dgemm and dtrsm in this process."""
-    return blas_routine("dgemm"), blas_routine("dtrsm")
+from scipy.linalg import cython_blas, cython_lapack
 
 
 @cache
@@ -20,5 +15,5 @@ def blas_routine(name: str) -> int:
     name_of, address_of = ctypes.pythonapi.PyCapsule_GetName, ctypes.pythonapi.PyCapsule_GetPointer
     name_of.argtypes, name_of.restype = [ctypes.py_object], ctypes.c_char_p
     address_of.argtypes, address_of.restype = [ctypes.py_object, ctypes.c_char_p], ctypes.c_void_p
-    capsule = cython_blas.__pyx_capi__[name]
+    capsule = (cython_blas.__pyx_capi__ | cython_lapack.__pyx_capi__)[name]
     return int(address_of(capsule, name_of(capsule)))

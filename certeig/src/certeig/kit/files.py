@@ -47,7 +47,7 @@ def require_writable(cache: str | Path) -> None:
             pass
     except OSError as error:
         raise InvalidParameterError(
-            f"cache must be a folder that can be written to; {folder}: {error}."
+            f"cache must be a folder that can be written to; {folder}: {error.strerror}. Choose another one."
         ) from error
 
 
@@ -87,7 +87,7 @@ def require_regular(path: Path) -> None:
     mode = path.stat().st_mode
     if not stat.S_ISREG(mode):
         kinds = {
-            stat.S_IFDIR: "a folder",
+            stat.S_IFDIR: "a folder. Name a file",
             stat.S_IFIFO: "a pipe",
             stat.S_IFCHR: "a device",
             stat.S_IFBLK: "a device",

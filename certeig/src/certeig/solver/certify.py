@@ -13,7 +13,7 @@ from certeig.kit.typing import ArrayLike
 from certeig.solver.diagnosis import remedy_for
 from certeig.solver.eigenpairs import Pairs
 from certeig.solver.factor import Factor
-from certeig.solver.inertia import count_beside
+from certeig.solver.inertia import count_again, count_beside
 from certeig.solver.pencil import Pencil, column_chunks, gram_columns
 
 # Eigenvalues closer than this, relative to the largest one, form a cluster.
@@ -73,9 +73,10 @@ def prove(
 ) -> Certificate:
     """Count the eigenvalues up to just above the last pair, or up to its cluster if more copies follow.
 
-    A factor at any shift, which is spent, may save a trial: its rounding tells what to expect. So
-    may values that follow the last pair: first the count is made halfway to the first of them. The
-    certificate, in the pencil's units, may be incomplete: then `count` differs from `n_found`.
+    A factor above all pairs that counts no more than these needs no other. One at any shift, which is
+    spent, may save a trial: its rounding tells what to expect. So may values that follow the last
+    pair: first the count is made halfway to the first of them. The certificate, in the pencil's
+    units, may be incomplete: then `count` differs from `n_found`.
 
     Raises a ConvergenceError if the pairs are not B-orthonormal eigenvectors, or no factor is good
     enough to count by.
@@ -83,6 +84,8 @@ def prove(
     k, certificate = len(pairs.values), quality(pencil, pairs)
     if k == pencil.n:
         return certificate
+    if factor and factor.count == k and (own := count_again(pencil, pairs, factor)):
+        return with_count(certificate, pairs, own.shift, own.count)
     for value in following[:1]:
         step = (float(value) - float(pairs.values[-1])) / 2
         if step > certificate.resolution:

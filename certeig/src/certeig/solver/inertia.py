@@ -55,6 +55,22 @@ def bound_count(pencil: Pencil, shift: float, side: float) -> int | None:
     return moved.count if moved and (moved.rounding() <= slack).all() else None
 
 
+def count_again(pencil: Pencil, pairs: Pairs, factor: Factor) -> Factor | None:
+    """Return a factor above all pairs as `count_beside` returns one; None if its rounding is too large."""
+    over = _move_of_shift(pencil, factor.rounding())
+    shift = factor.shift - over
+    clear = 2 * (pairs.error_bound + over) < shift - float(pairs.values[-1])
+    return replace(factor, shift=shift) if clear else None
+
+
+def _move_of_shift(pencil: Pencil, loss: Float[np.ndarray, " n"]) -> float:
+    """Return how far rounding moves σ.
+
+    W - σB - S + E ≤ W - (σ - ρ)B where no row of E has more than ρ c D of it above the slack.
+    """
+    return float((loss / pencil.mass_diagonal).max(initial=0.0)) / pencil.mass_floor
+
+
 def count_beside(
     pencil: Pencil,
     pairs: Pairs,
@@ -101,9 +117,7 @@ def count_beside(
     for _ in range(COUNT_TRIALS):
         factor = Factor.at(pencil, sigma, side * slack, factor)
         loss = factor.rounding() if factor else np.full(pencil.n, np.inf)
-        # What is above the slack moves σ: W - σB - S + E ≤ W - (σ - ρ)B where no row has more than
-        # ρ c D of it.
-        over = float(((loss - slack) / pencil.mass_diagonal).max(initial=0.0)) / pencil.mass_floor
+        over = _move_of_shift(pencil, loss - slack)
         moved = sigma - side * over
         if factor and not too_much(uncertainty(slack) + over, moved):
             return replace(factor, shift=moved)

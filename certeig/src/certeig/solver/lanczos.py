@@ -8,7 +8,7 @@ import numpy as np
 import scipy.linalg as sl
 from jaxtyping import Float, Int
 
-from certeig.kit.arrays import EPS, record
+from certeig.kit.arrays import EPS, TINY, record
 from certeig.kit.errors import ConvergenceError
 from certeig.solver.chebyshev import ChebyshevFilter
 from certeig.solver.factor import Factor
@@ -109,7 +109,7 @@ class ShiftedInverse:
     ) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"]]:
         """Return λ = σ + 1/θ, and 1/θ²."""
         # A column without direction has θ = 0; even the square of 1/θ stays finite.
-        sizes = np.maximum(np.abs(thetas), np.sqrt(np.finfo(np.float64).tiny))
+        sizes = np.maximum(np.abs(thetas), np.sqrt(TINY))
         distances = np.copysign(1 / sizes, thetas)
         return self.factor.shift + distances, distances**2
 

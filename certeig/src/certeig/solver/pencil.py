@@ -14,6 +14,7 @@ from certeig.kit.arrays import EPS, record
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.threads import map_in_threads
 from certeig.solver.residual_loops import add_sums
+from certeig.sparse.basis import sparse_rows
 from certeig.sparse.elimination import Elimination, analyze_pattern
 from certeig.sparse.symmetric_factor import FactorMemory, SymmetricFactor, factor_memory
 
@@ -226,8 +227,8 @@ def _pencil(
     stiffness, mass = _scale(stiffness, -up_w), _scale(mass, -up_b)
     diagonal = mass.diagonal()
     mass_floor = _mass_floor(mass, diagonal, known_floor, advice)
-    pattern = abs(stiffness) if mass_floor == 1.0 else abs(stiffness) + abs(mass)
-    labels = connected_components(pattern, directed=False)[1].astype(np.int64)
+    pattern = stiffness if mass_floor == 1.0 else abs(stiffness) + abs(mass)
+    labels = connected_components(pattern.T, directed=False)[1].astype(np.int64)  # by rows
     return Pencil(
         stiffness=stiffness,
         mass=mass,
@@ -275,17 +276,21 @@ def _exponent(matrix: sp.sparray) -> int:
 
 
 def _scale(matrix: sp.sparray, exponent: int) -> sp.csc_array:
-    scaled = sp.csc_array(matrix, dtype=np.float64, copy=True)
-    scaled.data = np.ldexp(scaled.data, exponent)
+    # The rows of a symmetric matrix serve as columns. Short indices take half of the memory.
+    columns = sp.csc_array(matrix.T if matrix.format == "csr" else matrix)
+    short = np.int32 if columns.nnz <= np.iinfo(np.int32).max else np.int64
+    places = columns.indices.astype(short), columns.indptr.astype(short)
+    data = np.ldexp(columns.data.astype(np.float64), exponent)
+    scaled = sp.csc_array((data, *places), shape=columns.shape)
     scaled.sum_duplicates()
     return scaled
 
 
 def _shift_pattern(stiffness: sp.csc_array, mass: sp.csc_array) -> ShiftPattern:
     # The sum of ones has an entry wherever W, B or the diagonal has one.
-    union = sp.eye_array(stiffness.shape[0], format="csc")
+    union = sp.eye_array(stiffness.shape[0], dtype=np.int8, format="csc")
     for matrix in (stiffness, mass):
-        ones = np.ones(matrix.nnz), matrix.indices, matrix.indptr
+        ones = np.ones(matrix.nnz, dtype=np.int8), matrix.indices, matrix.indptr
         union = union + sp.csc_array(ones, shape=matrix.shape)
     union.sort_indices()
     keys = _keys(union)
@@ -317,7 +322,7 @@ def _keys(matrix: sp.csc_array) -> Int[np.ndarray, " e"]:
 def _mass_floor(
     mass: sp.csc_array, diagonal: Float[np.ndarray, " n"], known: float, advice: Advice
 ) -> float:
-    if (mass - sp.diags_array(diagonal)).count_nonzero() == 0:
+    if mass.count_nonzero() == np.count_nonzero(diagonal):
         return 1.0
     # Linear elements have c = 1/2. The first of these that holds is used; those of badly scaled
     # bases are small, and farther apart.
@@ -368,11 +373,7 @@ def _sums(
 ) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
     """Return φᵀWφ / φᵀBφ, φᵀBφ, and Σ (Wφ - λBφ)² / D of each column, λ as given or that quotient."""
     sums = np.empty((3, vectors.shape[1]))
-    # One type of indices, whatever SciPy chose, as the kernel takes it.
-    stiffness, mass = (
-        (part.indptr.astype(np.int64), part.indices.astype(np.int64), part.data)
-        for part in (pencil.stiffness, pencil.mass)
-    )
+    stiffness, mass = sparse_rows(pencil.stiffness), sparse_rows(pencil.mass)
 
     def measure(columns: slice) -> None:
         part = np.ascontiguousarray(vectors[:, columns])

@@ -4,7 +4,8 @@
 enum { SUMMED_ROWS = 256 }; /* rows whose sums are added up separately first, for accuracy */
 
 struct matrix {
-    const int64_t *starts, *columns;
+    const int64_t *starts;
+    const int32_t *columns;
     const double *entries;
 };
 

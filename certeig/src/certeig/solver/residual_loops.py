@@ -1,7 +1,7 @@
 """Kernel of `pencil`: the sums in Rayleigh quotients and residuals, in one pass."""
 
 import numpy as np
-from jaxtyping import Float64, Int64
+from jaxtyping import Float64, Int32, Int64
 
 from certeig.kit.kernels import Out, kernel
 
@@ -11,8 +11,8 @@ Sums = Float64[np.ndarray, "3 k"]
 
 @kernel("n", "k")
 def add_sums(
-    stiffness: tuple[Pointers, Int64[np.ndarray, " e"], Float64[np.ndarray, " e"]],
-    mass: tuple[Pointers, Int64[np.ndarray, " f"], Float64[np.ndarray, " f"]],
+    stiffness: tuple[Pointers, Int32[np.ndarray, " e"], Float64[np.ndarray, " e"]],
+    mass: tuple[Pointers, Int32[np.ndarray, " f"], Float64[np.ndarray, " f"]],
     vectors: Float64[np.ndarray, "n k"],
     values: Float64[np.ndarray, " k"],
     weights: Float64[np.ndarray, " n"],
@@ -23,7 +23,7 @@ def add_sums(
 ) -> None:
     """Add φᵀWφ, φᵀBφ and Σ (Wφ - λBφ)² / weights of each column to the rows of `sums`; W and B are symmetric.
 
-    W and B are given by int64 pointers, indices and entries; `values` are the λ. Without residuals
+    W and B are given by int64 pointers, int32 indices and entries; `values` are the λ. Without residuals
     the values are not used and the last row of `sums` does not change. `images` (2, k) and `part`
     (3, k), filled with 0, are scratch. One loop serves both uses.
     """

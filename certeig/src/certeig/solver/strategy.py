@@ -18,7 +18,7 @@ from certeig.solver.components import solve_parts
 from certeig.solver.eigenpairs import Pairs, lowest_pairs, polish
 from certeig.solver.lanczos import Wanted, block_lanczos, grow_space
 from certeig.solver.pencil import Pencil
-from certeig.solver.shift import factorize_near, shift_inside
+from certeig.solver.shift import factorize_near, shift_above, shift_inside
 from certeig.solver.slices import walk
 from certeig.sparse.basis_loops import LANES
 
@@ -142,29 +142,37 @@ def _solve_sparse(
 ) -> tuple[Pairs, Certificate]:
     """Find the pairs by block Lanczos around one shift, or slice by slice, and what is missing by further runs."""
     require_memory_for_pairs(pencil, k)
-    # Where factors are costly, one pair more is sought: in the middle of the gap before it rounding
-    # does not matter, so that the first count serves.
+    # Where factors are costly, all eigenvalues below a shift above the wanted ones are sought, which
+    # its factor has counted; or else one pair more, so that the first count in the gap before it
+    # serves.
     heavy = pencil.shift_pattern.elimination.n_entries > HEAVY_ENTRIES * pencil.n
-    n_sought = min(k + heavy, pencil.n)
+    n_certified, n_sought = k, min(k + heavy, pencil.n)
     report(0.02, "looking for a shift")
     if in_slices:
         vectors, factor = walk(pencil, n_sought, _in_run(report, 0))
     else:
-        factor = shift_inside(pencil, k)
+        factor = shift_above(pencil, k) if heavy else shift_inside(pencil, k)
+        if heavy:
+            n_certified = max(k, factor.count)
+            n_sought = min(n_certified + 1, pencil.n)
         wanted = Wanted(below=factor.count, above=n_sought - factor.count)
         none = np.empty((pencil.n, 0))
         _, vectors = block_lanczos(pencil, factor, wanted, locked=none, report=_in_run(report, 0))
 
     for run in range(1, MOST_RUNS + 1):
         found = polish(pencil, factor, lowest_pairs(pencil, vectors, n_sought))
-        pairs, following = found.select(slice(k)), found.values[k:]
+        pairs, following = found.select(slice(n_certified)), found.values[n_certified:]
         report(0.9, "counting eigenvalues")
-        n_found, count_shift, missing = len(pairs.values), np.inf, k - len(pairs.values)
-        if n_found == k:
+        n_found, count_shift = len(pairs.values), np.inf
+        missing = n_certified - n_found
+        if missing == 0:
             certificate = prove(pencil, pairs, factor, following)
             if certificate.complete:
+                if n_certified > k:
+                    pairs, certificate = take_pairs(pencil, pairs, certificate, 0, k)
                 return pairs, certificate
-            count_shift, missing = certificate.shift, min(max(certificate.n_missing, 0), k)
+            count_shift = certificate.shift
+            missing = min(max(certificate.n_missing, 0), n_certified)
         if missing == 0 or run == MOST_RUNS:
             break
 
@@ -172,7 +180,7 @@ def _solve_sparse(
         n_below = factor.count - int(np.count_nonzero(pairs.values < factor.shift))
         below = min(max(n_below, 0), missing)
         wanted = Wanted(below=below, above=missing - below, ceiling=count_shift)
-        if n_found == k:
+        if n_found == n_certified:
             # The count has spent the factor, which saves much memory where nothing is missing.
             factor = factorize_near(pencil, factor.shift)
         _, more = block_lanczos(
@@ -187,8 +195,8 @@ def _solve_sparse(
             break
         vectors = np.hstack([pairs.vectors, more])
     raise ConvergenceError(
-        f"Every eigenvalue that inertia counts must be found; {len(pairs.values)} of {k} were found in {run} runs "
-        f"and {missing} are missing."
+        f"Every eigenvalue that inertia counts must be found; {len(pairs.values)} of {n_certified} were found in "
+        f"{run} runs and {missing} are missing."
     )
 
 

@@ -72,9 +72,9 @@ def combine_columns(space: Slots, weights: Float[np.ndarray, "m k"]) -> Float[np
 
 
 def sparse_rows(symmetric: sp.csr_array | sp.csc_array) -> SparseRows:
-    """Return the rows of a symmetric matrix, which are its columns, for `multiply`."""
-    pointers, indices = symmetric.indptr.astype(np.int64), symmetric.indices.astype(np.int32)
-    return pointers, indices, symmetric.data
+    """Return the rows of a symmetric matrix, which are its columns, as kernels take them."""
+    indices = symmetric.indices.astype(np.int32, copy=False)
+    return symmetric.indptr.astype(np.int64), indices, symmetric.data
 
 
 def multiply(

@@ -1,5 +1,5 @@
-/* Two routines of SciPy's BLAS, whose addresses Python hands in, on parts of matrices in C order. A
-   part is given by its first entry, and by the number of entries from one row to the next. */
+/* A routine of SciPy's BLAS, whose address Python hands in, on parts of matrices in C order. A part
+   is given by its first entry, and by the number of entries from one row to the next. */
 #pragma once
 #include "kernels.h"
 
@@ -7,8 +7,6 @@ struct blas {
     void (*dgemm)(const char *, const char *, const int *, const int *, const int *, const double *,
                   const double *, const int *, const double *, const int *, const double *,
                   double *, const int *);
-    void (*dtrsm)(const char *, const char *, const char *, const char *, const int *, const int *,
-                  const double *, const double *, const int *, double *, const int *);
 };
 
 /* Subtract A Bᵀ from C. In Fortran's order every matrix is transposed: Cᵀ = Cᵀ - B Aᵀ. */
@@ -18,11 +16,4 @@ static inline void subtract_product(const struct blas *blas, int rows, int colum
     const double minus = -1, one = 1;
     blas->dgemm("T", "N", &columns, &rows, &terms, &minus, b, &b_wide, a, &a_wide, &one, c,
                 &c_wide);
-}
-
-/* Replace X by X L⁻ᵀ, where L is unit lower triangular. */
-static inline void solve_triangle(const struct blas *blas, int rows, int columns, const double *l,
-                                  int l_wide, double *x, int x_wide) {
-    const double one = 1;
-    blas->dtrsm("L", "U", "T", "U", &columns, &rows, &one, l, &l_wide, x, &x_wide);
 }

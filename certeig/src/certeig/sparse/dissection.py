@@ -6,9 +6,7 @@ from functools import partial
 from itertools import chain, count, pairwise
 
 import numpy as np
-import scipy.sparse as sp
 from jaxtyping import Int
-from scipy.sparse.csgraph import breadth_first_order, maximum_bipartite_matching
 
 from certeig.kit.threads import SpareMemory, free_threads, map_in_threads
 from certeig.sparse.dissection_loops import (
@@ -17,6 +15,7 @@ from certeig.sparse.dissection_loops import (
     breadth_first,
     cheapest_cut,
     count_cuts,
+    narrow_cut,
     order_leaf,
     smooth_keys,
     take_sides,
@@ -39,7 +38,7 @@ DENSE = 10
 # Points far apart whose distances make the keys in a solid. In a cube these are corners, and the cut
 # across the diagonal of the first two is larger than others.
 SOLID_ENDS = 4
-BELOW, ABOVE, CUT = 0, 1, 2  # sides of a segment, as `take_sides` numbers them
+CUT = 2  # a side of a segment, as `take_sides` numbers them
 
 
 @dataclass(frozen=True)
@@ -106,11 +105,10 @@ class _Dissection:
         neighbors = len(indices) / max(n, 1)
         # Points on a cut, squared, over the points that it cuts, from which on these are of a solid
         self.solid_cut = neighbors if neighbors >= DENSE else np.inf
-        self.rows = sp.csr_array((np.ones(len(indices)), indices, indptr), shape=(n, n))
         self.nodes, self.place = np.arange(n), np.arange(n)  # nodes[place[v]] = v
         # The name of the segment that a point lies in; -1 when its place is final.
         self.owner = np.zeros(n, dtype=np.int64)
-        self.one, self.queue, self.key = (np.empty(n, dtype=np.int64) for _ in range(3))
+        self.one, self.queue, self.key, self.via = np.empty((4, n), dtype=np.int64)
         bits = LEAF * -(-n // WORD)
         self.leaf_memory = SpareMemory(
             lambda: (
@@ -189,12 +187,12 @@ class _Dissection:
                     lowest = cost
                     take_sides(*graph, points, owner, name, key, low + cut_at, from_above, side)
             distances.append(latest)
-            n_cut = np.count_nonzero(side == CUT)
+            n_cut = int(np.count_nonzero(side == CUT))
             solid = solid or bool(n_cut**2 > self.solid_cut * size)
             if n_before == 1 and not solid:
                 break
         else:
-            side = self._narrow_cut(points, name, side)
+            narrow_cut(*graph, points, owner, name, key, one, self.via, queue, side)
         n_first, _, n_cut = np.bincount(side, minlength=3).tolist()
         # If half of all pairs are joined, no order saves much, and cuts of one point each take
         # long.
@@ -204,71 +202,6 @@ class _Dissection:
             return None
         points[:] = points[np.argsort(side, kind="stable")]
         return n_first, n_cut, solid
-
-    def _narrow_cut(self, points: Indices, name: int, side: Indices) -> Indices:
-        """Return sides with a cut that costs as much or less, found by bipartite matchings (Liu 1989).
-
-        Take the edges between the cut and one side. The fewest points that meet all of them are a
-        cut as well: the other points of the old cut have no neighbor left on that side, and go to
-        the opposite one.
-        """
-        sides = self.key  # free here; an entry for each point of the graph
-        sides[points] = side
-        lowest = _cost(side)
-        for near in (BELOW, ABOVE, BELOW, ABOVE):
-            cut = points[sides[points] == CUT]
-            rows = self.rows[cut]
-            others = rows.indices
-            joined = (self.owner[others] == name) & (sides[others] == near)
-            if not joined.any():
-                continue
-            beside, columns = np.unique(others[joined], return_inverse=True)
-            rows_joined = np.repeat(np.arange(len(cut)), np.diff(rows.indptr))[joined]
-            edges = sp.coo_array(
-                (np.ones(len(columns)), (rows_joined, columns)), shape=(len(cut), len(beside))
-            )
-            released, taken = _cover_edges(edges.tocsr())
-            before = sides[points]
-            sides[cut[released]] = ABOVE - near
-            sides[beside[taken]] = CUT
-            cost = _cost(sides[points])
-            if cost < lowest:
-                lowest = cost
-            else:
-                sides[points] = before
-        return sides[points].astype(np.int8)
-
-
-def _cost(sides: Indices) -> float:
-    """Return the points on a cut, over those on its smaller side."""
-    below, above, cut = np.bincount(sides, minlength=3).tolist()
-    return (cut + 1) / min(below, above) if min(below, above) else np.inf
-
-
-def _cover_edges(edges: sp.csr_array) -> tuple[Indices, Indices]:
-    """Return the rows outside and the columns inside of a smallest cover of all entries (Konig 1931).
-
-    With a largest matching these are what alternating paths reach from rows without a partner: by
-    any entry to a column, and by the matching back to a row.
-    """
-    n_rows, n_columns = edges.shape
-    partner = maximum_bipartite_matching(edges, perm_type="column")  # the column of each row, or -1
-    free, matched = np.flatnonzero(partner < 0), np.flatnonzero(partner >= 0)
-    start = n_rows + n_columns
-    one, two = edges.nonzero()
-    steps = sp.coo_array(
-        (
-            np.ones(len(one) + n_rows),
-            (
-                np.concatenate([one, n_rows + partner[matched], np.full(len(free), start)]),
-                np.concatenate([n_rows + two, matched, free]),
-            ),
-        ),
-        shape=(start + 1, start + 1),
-    )
-    reached = breadth_first_order(steps.tocsr(), start, return_predecessors=False)
-    columns = reached[(reached >= n_rows) & (reached < start)] - n_rows
-    return reached[reached < n_rows], columns
 
 
 def _find_pieces(

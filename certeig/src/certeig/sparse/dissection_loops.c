@@ -118,6 +118,89 @@ KERNEL void take_sides(const int64_t *indptr, const int64_t *indices, const int6
     }
 }
 
+enum { SIDES = 3, CUT = 2, NARROWINGS = 4 };
+
+struct pairing {
+    const int64_t *indptr, *indices, *owner, *sides;
+    int64_t name, near;
+    int64_t *partner, *via, *queue;
+};
+
+/* Take the points beside the given one on the near side that were not reached before; return whether
+   any was. A reached point without a partner ends the search. */
+static bool reach(const struct pairing *it, int64_t row, int64_t *tail, int64_t *free) {
+    bool found = false;
+    for (int64_t at = it->indptr[row]; at < it->indptr[row + 1] && *free < 0; at++) {
+        int64_t other = it->indices[at];
+        if (it->owner[other] != it->name || it->sides[other] != it->near) continue;
+        found = true;
+        if (it->via[other] >= 0) continue;
+        it->via[other] = row;
+        it->queue[(*tail)++] = other;
+        if (it->partner[other] < 0) *free = other;
+    }
+    return found;
+}
+
+/* Find a partner on the near side for a point of the cut, by a path that changes partners (Kuhn). What
+   is reached in vain keeps its mark: no later path leads through it. Return whether the point has a
+   neighbor on that side. */
+static bool pair_up(const struct pairing *it, int64_t root) {
+    int64_t tail = 0, free = -1;
+    bool joined = reach(it, root, &tail, &free);
+    for (int64_t head = 0; head < tail && free < 0; head++)
+        reach(it, it->partner[it->queue[head]], &tail, &free);
+    if (free < 0) {
+        it->via[root] = root;
+        for (int64_t i = 0; i < tail; i++) it->via[it->partner[it->queue[i]]] = root;
+        return joined;
+    }
+    while (free >= 0) {
+        int64_t row = it->via[free], before = it->partner[row];
+        it->partner[free] = row;
+        it->partner[row] = free;
+        free = row == root ? -1 : before;
+    }
+    for (int64_t i = 0; i < tail; i++) it->via[it->queue[i]] = -1;
+    return true;
+}
+
+static double cost_of_cut(const int64_t *counts) {
+    int64_t smaller = lesser(counts[0], counts[1]);
+    return smaller ? (double)(counts[CUT] + 1) / (double)smaller : INFINITE;
+}
+
+KERNEL void narrow_cut(const int64_t *indptr, const int64_t *indices, const int64_t *segment,
+                       const int64_t *owner, int64_t name, int64_t *sides, int64_t *partner,
+                       int64_t *via, int64_t *queue, int8_t *side, int64_t size) {
+    int64_t counts[SIDES] = {0};
+    for (int64_t i = 0; i < size; i++) counts[sides[segment[i]] = side[i]]++;
+    for (int64_t pass = 0; pass < NARROWINGS; pass++) {
+        int64_t near = pass % 2;
+        struct pairing it = {indptr, indices, owner, sides, name, near, partner, via, queue};
+        for (int64_t i = 0; i < size; i++) partner[segment[i]] = via[segment[i]] = -1;
+        bool joined = false;
+        for (int64_t i = 0; i < size; i++)
+            if (sides[segment[i]] == CUT) joined |= pair_up(&it, segment[i]);
+        if (!joined) continue;
+        /* Marked points of the cut go to the opposite side, and marked ones beside it to the cut. */
+        int64_t after[SIDES] = {0}, goes_to[SIDES];
+        goes_to[near] = CUT;
+        goes_to[CUT] = 1 - near;
+        for (int64_t i = 0; i < size; i++) {
+            int64_t now = sides[segment[i]];
+            after[via[segment[i]] >= 0 ? goes_to[now] : now]++;
+        }
+        if (cost_of_cut(after) >= cost_of_cut(counts)) continue;
+        for (int64_t i = 0; i < SIDES; i++) counts[i] = after[i];
+        for (int64_t i = 0; i < size; i++) {
+            int64_t *now = sides + segment[i];
+            if (via[segment[i]] >= 0) *now = goes_to[*now];
+        }
+    }
+    for (int64_t i = 0; i < size; i++) side[i] = (int8_t)sides[segment[i]];
+}
+
 /* Sets of neighbors: WORD bits a word. Literals of 64 bits, since 1 << 40 of an int is another set. */
 static inline bool has(const int64_t *set, int64_t i) { return set[i / WORD] >> (i % WORD) & 1; }
 static inline void include(int64_t *set, int64_t i) { set[i / WORD] |= INT64_C(1) << (i % WORD); }

@@ -101,6 +101,29 @@ def take_sides(
     """Fill the side of each point of a segment: 0 below the level, 1 above, 2 on the cut."""
 
 
+@kernel("size")
+def narrow_cut(
+    indptr: Pointers,
+    indices: Some,
+    segment: Segment,
+    owner: Points,
+    name: int,
+    sides: Out[Points],
+    partner: Out[Points],
+    via: Out[Points],
+    queue: Out[Segment],
+    side: Out[Int8[np.ndarray, " size"]],
+) -> None:
+    """Replace sides by some with a cut that costs as much or less, found by bipartite matchings (Liu 1989).
+
+    Take the edges between the cut and one side. The fewest points that meet all of them are a cut as
+    well: the other points of the old cut have no neighbor left on that side, and go to the opposite
+    one. With a largest matching (Konig 1931) these points are those of the near side that alternating
+    paths reach from points of the cut without a partner, and the points of the cut that they do not.
+    The other arrays are scratch.
+    """
+
+
 @kernel()
 def order_leaf(
     indptr: Pointers,

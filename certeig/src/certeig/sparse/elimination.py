@@ -37,8 +37,10 @@ class Elimination:
         Where the entries of each front begin in the array of all entries of L.
     tasks : Tasks
         How threads share the fronts.
-    stacks : (t+1,) int
-        Where the stack of updates of each task begins in the memory of all, in numbers.
+    stacks : (t,) int
+        Numbers in the stack of updates of each task.
+    taken : (t,) int
+        The last task that takes updates from that stack.
     tallest : int
         The rows of the largest front.
     lengths : (s,) int
@@ -58,6 +60,7 @@ class Elimination:
     places: Indices
     tasks: Tasks
     stacks: Indices
+    taken: Indices
     tallest: int
     lengths: Indices
     lower_ptr: Indices
@@ -125,6 +128,7 @@ def analyze_pattern(pattern: sp.csc_array) -> Elimination:
 
     places = _panel_places(widths, heights)
     tasks = divide_fronts(first, begins, rows, above, places)
+    stacks, taken = _stacks(heights - widths, above, tasks)
     return Elimination(
         order=order,
         first=first,
@@ -135,7 +139,8 @@ def analyze_pattern(pattern: sp.csc_array) -> Elimination:
         older=older,
         places=places,
         tasks=tasks,
-        stacks=_stacks(heights - widths, above, tasks),
+        stacks=stacks,
+        taken=taken,
         tallest=int(heights.max()),
         lengths=_count_roundings(widths, heights, above),
         lower_ptr=lower_ptr,
@@ -196,10 +201,10 @@ def _panel_places(widths: Indices, heights: Indices) -> Indices:
     return np.concatenate([[0], np.cumsum(entries)])
 
 
-def _stacks(counts: Indices, above: Indices, tasks: Tasks) -> Indices:
-    """Return where the updates of each task begin, given the rows of the update of each front.
+def _stacks(counts: Indices, above: Indices, tasks: Tasks) -> tuple[Indices, Indices]:
+    """Return `stacks` and `taken` of an `Elimination`, given the rows of the update of each front.
 
-    An update waits on the stack of its task until its parent is processed, or the last task is.
+    An update waits on the stack of its task until its parent is processed.
     """
     task = np.repeat(np.arange(tasks.n), np.diff(tasks.first))
     triangles = counts * (counts + 1) // 2
@@ -209,21 +214,23 @@ def _stacks(counts: Indices, above: Indices, tasks: Tasks) -> Indices:
     sizes = np.cumsum(change)
     before = np.concatenate([[0], sizes])[tasks.first[:-1]]
     largest = np.maximum.reduceat(sizes, tasks.first[:-1]) - before
-    return np.concatenate([[0], np.cumsum(largest)])
+
+    taken, has_parent = np.arange(tasks.n), np.flatnonzero(above >= 0)
+    np.maximum.at(taken, task[has_parent], task[above[has_parent]])
+    return largest, taken
 
 
 def _count_roundings(widths: Indices, heights: Indices, above: Indices) -> Indices:
     """Return `lengths` of an `Elimination`.
 
-    A front adds the updates of its children. Then blocks of its columns update others, LONG terms
-    at a time.
+    A front adds the updates of its children. Then blocks of LONG columns update others in one product
+    each. In the front that eliminates an entry, so do panels of its block, and columns of its panel
+    one by one.
     """
     size = len(above)
     children = np.bincount(above[above >= 0], minlength=size)
-    # Blocks of NARROW columns are doubled until they are as wide as the front.
-    doublings = np.ceil(np.log2(np.maximum(widths / fronts.NARROW, 1))).astype(np.int64)
-    own = np.where(heights > fronts.SMALL, widths // fronts.LONG + 2 + doublings, widths) + children
-    longest = [fronts.LONG] * size
+    own = np.where(heights > fronts.SMALL, widths // fronts.LONG + 1, widths) + children
+    longest = [fronts.LONG + fronts.LONG // fronts.WIDE + fronts.WIDE] * size
     for s, (parent, roundings) in enumerate(zip(above.tolist(), own.tolist(), strict=True)):
         longest[s] += roundings
         if parent >= 0:

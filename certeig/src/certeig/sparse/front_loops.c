@@ -1,10 +1,7 @@
 /* Loops of `elimination`: L D Lᵀ front by front, and solves with it. */
 #include "sparse/dense.h"
-#include "sparse/lanes.h"
 
 enum {
-    WIDE =
-        64, /* columns in a panel of L: 32 of its rows are 16 KiB, half of the first-level cache */
     SMALL = 40, /* rows of a front up to which plain loops are faster (measured) */
     NEAR = 32,  /* rows of a panel that fit into the first-level cache */
     SOON = 64,  /* cache lines of the next panel that are asked for ahead (measured) */
@@ -26,7 +23,7 @@ struct updates {
 };
 struct room {
     double *front, *times;
-    int64_t *local;
+    int64_t *local, *ends;
 };
 
 /* Add the entries of the matrix in the columns of front s. */
@@ -39,12 +36,24 @@ static void gather_entries(const struct fronts *tree, const struct lower *lower,
     }
 }
 
-/* Add an update, a lower triangle row by row, to the entries of a front in these rows. */
+/* Add an update, a lower triangle row by row, to the entries of a front in these rows. Most of them
+   are next to each other in the front, too, in a few runs. */
 static void add_update(const double *update, const int64_t *rows, int64_t count,
                        const struct room *room, int64_t height) {
+    const int64_t *local = room->local;
+    int64_t *ends = room->ends;
+    for (int64_t j = count - 1; j >= 0; j--) {
+        bool continues = j + 1 < count && local[rows[j + 1]] == local[rows[j]] + 1;
+        ends[j] = continues ? ends[j + 1] : j + 1;
+    }
     for (int64_t i = 0; i < count; i++) {
-        double *target = room->front + room->local[rows[i]] * height;
-        for (int64_t j = 0; j <= i; j++) target[room->local[rows[j]]] += *update++;
+        double *target = room->front + local[rows[i]] * height;
+        for (int64_t j = 0; j <= i; j = ends[j]) {
+            double *run = target + local[rows[j]] - j;
+            int64_t stop = lesser(ends[j], i + 1);
+            for (int64_t k = j; k < stop; k++) run[k] += update[k];
+        }
+        update += i + 1;
     }
 }
 
@@ -64,7 +73,8 @@ KERNEL bool factor_fronts(const struct fronts *tree, const struct lower *lower, 
     double *front = room->front;
     for (int64_t s = begin; s < end; s++) {
         int64_t height = begins[s + 1] - begins[s], width = first[s + 1] - first[s];
-        for (int64_t i = 0; i < height * height; i++) front[i] = 0;
+        for (int64_t i = 0; i < height; i++)
+            for (int64_t j = 0; j < lesser(i + SHORT, height); j++) front[i * height + j] = 0;
         for (int64_t i = 0; i < height; i++) room->local[rows[begins[s] + i]] = i;
         gather_entries(tree, lower, room, s, height);
         for (int64_t child = tree->last_child[s]; child >= 0; child = tree->older[child]) {

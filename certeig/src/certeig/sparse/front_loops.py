@@ -7,7 +7,6 @@ from certeig.kit.kernels import Out, kernel
 
 WIDE = 64  # columns in a panel of L
 SMALL = 40  # rows of a front up to which plain loops are faster (measured)
-NARROW = 16  # columns that are eliminated one by one
 LONG = 256  # terms of a sum in one product
 
 Some = Int64[np.ndarray, " _"]
@@ -28,11 +27,11 @@ def factor_fronts(
     panels: Out[Numbers],
     pivots: Out[Values],
     updates: tuple[Out[Numbers], Out[Fronts]],
-    room: tuple[Out[Numbers], Out[Numbers], Out[Points]],
+    room: tuple[Out[Numbers], Out[Numbers], Out[Points], Out[Some]],
     begin: int,
     end: int,
     top: int,
-    blas: tuple[int, int],
+    blas: tuple[int],
 ) -> bool:
     """Fill panels and pivots with L and D of the fronts begin to end - 1, which are one task.
 
@@ -41,8 +40,9 @@ def factor_fronts(
     rest to its parent as an update.
 
     `tree` is the elimination, `lower` the matrix by the columns of its lower triangle, `updates`
-    memory for updates and the place of each, `room` memory for two fronts and a number for each
-    row. The updates of a task are a stack of lower triangles, row by row, from `top` on. Returns
+    memory for updates and the place of each. `room` is memory for a front, for LONG numbers of each
+    of its rows and a panel of eight rows, and for a number of each row of the matrix and of the
+    front. The updates of a task are a stack of lower triangles, row by row, from `top` on. Returns
     whether all pivots are finite and not zero.
     """
 

@@ -5,7 +5,7 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 
 from certeig.kit.arrays import EPS, record
-from certeig.kit.blas import blas_routines
+from certeig.kit.blas import blas_routine
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.threads import (
     SpareMemory,
@@ -19,8 +19,8 @@ from certeig.sparse.basis_loops import LANES
 from certeig.sparse.elimination import Elimination, analyze_pattern
 
 Indices = Int[np.ndarray, " ..."]
-# Two fronts, and a number for each row.
-Room = tuple[Float[np.ndarray, " f"], Float[np.ndarray, " f"], Indices]
+# A front, its latest columns, and a number for each row of the matrix and of the front.
+Room = tuple[Float[np.ndarray, " f"], Float[np.ndarray, " g"], Indices, Indices]
 # The stacks of all tasks, and the place of each front in its stack.
 Updates = tuple[Float[np.ndarray, " u"], Indices]
 
@@ -59,19 +59,18 @@ class SymmetricFactor:
         lower = e.lower_ptr, e.lower_rows, data[e.source]
         panels = np.empty(e.n_entries) if spent is None else spent.panels
         pivots = np.empty(len(e.order))
+        blas = (blas_routine("dgemm"),)
 
         def factor_task(task: int) -> bool:
             """Factor the fronts of a task; return whether all pivots are usable."""
             begin, end = int(e.tasks.first[task]), int(e.tasks.first[task + 1])
             with memory.rooms.lend() as room:
                 given = tree, lower, panels, pivots, updates, room
-                return bool(
-                    fronts.factor_fronts(*given, begin, end, int(e.stacks[task]), blas_routines())
-                )
+                return bool(fronts.factor_fronts(*given, begin, end, memory.stacks[task], blas))
 
         with memory.updates.lend() as updates:
-            for tasks in e.tasks.rounds:
-                if not all(map_in_threads(factor_task, tasks.tolist())):
+            for tasks in memory.rounds:
+                if not all(map_in_threads(factor_task, tasks)):
                     return None
         return cls(e, panels, pivots)
 
@@ -196,8 +195,19 @@ class FactorMemory:
     """Memory that is needed while a matrix is factored; factors of one pattern use it in turn.
 
     New memory pages cost half as much as a factorization.
+
+    Attributes
+    ----------
+    rounds : list of list of int
+        The tasks of a factor; those of one round may be done side by side.
+    stacks : list of int
+        Where the stack of updates of each task begins, in numbers.
+    updates, rooms : SpareMemory
+        All stacks, and what each thread needs.
     """
 
+    rounds: list[list[int]]
+    stacks: list[int]
     updates: SpareMemory[Updates]
     rooms: SpareMemory[Room]
 
@@ -205,12 +215,43 @@ class FactorMemory:
 def factor_memory(elimination: Elimination) -> FactorMemory:
     """Return memory for factors of a pattern; nothing is allocated before the first."""
     e = elimination
-    n, square = len(e.order), e.tallest**2
+    n, tallest = len(e.order), e.tallest
+    # One thread takes tasks in order, so that more of them can use the same memory in turn.
+    serial = free_threads() == 1
+    rounds = (
+        [[task] for task in range(e.tasks.n)] if serial else [r.tolist() for r in e.tasks.rounds]
+    )
+    stacks, n_numbers = _place_stacks(e, rounds)
+    latest = tallest * fronts.LONG + fronts.WIDE * LANES
     return FactorMemory(
-        updates=SpareMemory(
-            lambda: (np.empty(e.stacks[-1]), np.empty(len(e.above), dtype=np.int64))
-        ),
+        rounds=rounds,
+        stacks=stacks,
+        updates=SpareMemory(lambda: (np.empty(n_numbers), np.empty(len(e.above), dtype=np.int64))),
         rooms=SpareMemory(
-            lambda: (np.empty(square), np.empty(square), np.empty(n, dtype=np.int64))
+            lambda: (
+                np.empty(tallest**2),
+                np.empty(latest),
+                np.empty(n, dtype=np.int64),
+                np.empty(tallest, dtype=np.int64),
+            )
         ),
     )
+
+
+def _place_stacks(e: Elimination, rounds: list[list[int]]) -> tuple[list[int], int]:
+    """Return where the stacks of all tasks begin, each at the first free place, and where the last ends.
+
+    A place is free again after the round in which the last update is taken from it.
+    """
+    sizes, begins, taken = e.stacks.tolist(), [0] * e.tasks.n, e.taken.tolist()
+    round_of = {task: number for number, tasks in enumerate(rounds) for task in tasks}
+    placed: list[int] = []
+    for number, tasks in enumerate(rounds):
+        placed = [task for task in placed if round_of[taken[task]] >= number]
+        for task in tasks:
+            for other in sorted(placed, key=begins.__getitem__):
+                if begins[other] - begins[task] >= sizes[task]:
+                    break
+                begins[task] = max(begins[task], begins[other] + sizes[other])
+            placed.append(task)
+    return begins, max(begin + size for begin, size in zip(begins, sizes, strict=True))
