@@ -2,9 +2,12 @@ import numpy as np
 import pytest
 
 from eigenshape.geometry.facets import facet_components, facet_table
-from eigenshape.geometry.resolution.subdivision import pieces, subdivide
+from eigenshape.geometry.measure import edge_lengths, face_areas
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.resolution.subdivision import pieces, split_long_edges, subdivide
 from eigenshape.geometry.simplices import simplex_volumes
 from eigenshape.geometry.simplicial import SimplicialMesh
+from eigenshape.shapes.creatures import make_creature
 from eigenshape.shapes.domains import ball, circle, interval
 from eigenshape.shapes.surfaces import grid
 
@@ -62,3 +65,42 @@ def test_shapes_stay_few():
     first, second = np.triu_indices(4, 1)
     lengths = np.sort(np.linalg.norm(corners[:, first] - corners[:, second], axis=2), axis=1)
     assert len(np.unique(np.round(lengths, 9), axis=0)) <= 3
+
+
+def test_long_edges_are_split_and_no_point_moves():
+    mesh = make_creature("quadruped", n_vertices=500)
+    longest = 0.6 * edge_lengths(mesh).max()
+    fine, origins = split_long_edges(mesh, longest, 10_000)
+    assert edge_lengths(fine).max() <= longest
+    assert (fine.vertices[: mesh.n_vertices] == mesh.vertices).all()
+    assert origins[: mesh.n_vertices].tolist() == list(range(mesh.n_vertices))
+    away = np.linalg.norm(fine.vertices - mesh.vertices[origins], axis=1)
+    assert away.max() < edge_lengths(mesh).max()
+    # The faces lie in those of the mesh, face the same way, and leave no gap.
+    assert face_areas(fine).sum() == pytest.approx(face_areas(mesh).sum(), rel=1e-12)
+    before, after = (signed_volume(each) for each in (mesh, fine))
+    assert after == pytest.approx(before, rel=1e-12)
+    assert fine.n_vertices - fine.n_faces / 2 == mesh.n_vertices - mesh.n_faces / 2
+
+
+def signed_volume(mesh):
+    a, b, c = mesh.vertices[mesh.faces].transpose(1, 0, 2)
+    return np.einsum("fi,fi->", a, np.cross(b, c)) / 6
+
+
+def test_split_edges_do_not_depend_on_the_order_of_corners():
+    mesh = make_creature("hand", n_vertices=500)
+    rolled = TriangleMesh(mesh.vertices, mesh.faces[::-1, [1, 2, 0]])
+    length = float(np.median(edge_lengths(mesh)))
+    points = [split_long_edges(each, length, 10_000)[0].vertices for each in (mesh, rolled)]
+    one, other = (each[np.lexsort(each.T)] for each in points)
+    assert np.allclose(one, other, rtol=0, atol=1e-15)
+
+
+def test_edges_are_split_until_there_are_as_many_vertices_as_wanted():
+    mesh = grid(2, 2)
+    same, origins = split_long_edges(mesh, 0.01, mesh.n_vertices)
+    assert same is mesh
+    assert origins.tolist() == list(range(9))
+    assert split_long_edges(mesh, 10.0, 1000)[0] is mesh
+    assert mesh.n_vertices < split_long_edges(mesh, 0.01, 40)[0].n_vertices <= 40

@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import eigenshape as es
+from eigenshape.geometry.resolution.subdivision import split_long_edges
 from eigenshape.retrieval.patches import patches as patches_module
 from eigenshape.retrieval.patches.patch_loops import (
     HEIGHT_BINS,
@@ -192,3 +194,30 @@ def test_a_large_surface_is_described_by_a_thin_one(monkeypatch):
     whole = es.retrieval.patch_descriptor(extract_patches(fine, n_views=0), found.recipe)
     thin = es.retrieval.patch_descriptor(extract_patches(coarse, n_views=0), found.recipe)
     assert es.retrieval.patch_scores(whole, [thin])[0] < 0.1
+
+
+def bracket(length: float) -> es.TriangleMesh:
+    """An L of flat faces, with edges up to a length."""
+    flat = [(0, 0), (3, 0), (3, 1), (1, 1), (1, 4), (0, 4)]
+    points = np.array([(x, y, z) for z in (0.0, 1.5) for x, y in flat])
+    bottom = [(0, 3, 2), (0, 2, 1), (0, 4, 3), (0, 5, 4)]
+    top = [(a + 6, c + 6, b + 6) for a, b, c in bottom]
+    sides = [
+        face for i in range(6) for j in [(i + 1) % 6] for face in [(i, j, j + 6), (i, j + 6, i + 6)]
+    ]
+    return split_long_edges(es.TriangleMesh(points, bottom + top + sides), length, 10_000)[0]
+
+
+def test_large_flat_faces_are_described_like_small_ones():
+    recipe = es.retrieval.PatchRecipe()
+    whole, fine = (es.describe(bracket(length), recipe) for length in (9.0, 0.15))
+    cube = es.describe(es.geometry.boundary_surface(es.shapes.box(1, 1, 1)), recipe)
+    scores = es.retrieval.patch_scores(whole, [fine, cube])
+    assert scores[0] < 0.25  # 0.57 if discs hold the corners alone
+    assert scores[1] > 2 * scores[0]
+    assert whole.vertices.max() < 12  # vertices of the mesh that was given
+    # A moved copy in another unit is a double: lengths are measured by the area, not by the box.
+    part = bracket(9.0)
+    turn = Rotation.from_rotvec([0.4, 1.0, 2.0]).as_matrix()
+    moved = es.describe(es.TriangleMesh(25.4 * part.vertices @ turn, part.faces), recipe)
+    assert es.retrieval.patch_scores(whole, [moved])[0] < 0.05

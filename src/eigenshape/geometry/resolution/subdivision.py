@@ -9,6 +9,7 @@ from jaxtyping import Int
 
 from certeig.kit.arrays import freeze
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
+from eigenshape.geometry.measure import edge_lengths
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import Mesh, SimplicialMesh
 from eigenshape.geometry.topology import edge_table
@@ -55,10 +56,8 @@ def subdivide(mesh: MeshLike) -> Mesh:
     if isinstance(mesh, TriangleMesh):
         table = edge_table(mesh)
         middles = mesh.vertices[table.edges].mean(axis=1)
-        a, b, c = mesh.faces.T
-        at_a, at_b, at_c = (table.face_edges + mesh.n_vertices).T
-        quarters = [(a, at_c, at_b), (b, at_a, at_c), (c, at_b, at_a), (at_a, at_b, at_c)]
-        faces = np.stack([np.column_stack(quarter) for quarter in quarters], axis=1)
+        quarters = _quarters(mesh.faces, table.face_edges + mesh.n_vertices)
+        faces = np.stack(quarters, axis=1)
         return TriangleMesh(np.concatenate([mesh.vertices, middles]), faces.reshape(-1, 3))
 
     # The pieces depend on the order of the corners. If all simplices with an edge have its ends in
@@ -76,6 +75,52 @@ def subdivide(mesh: MeshLike) -> Mesh:
     simplices[between] = mesh.n_points + places
     points = np.concatenate([mesh.points, mesh.points[edges].mean(axis=1)])
     return SimplicialMesh(points, simplices.reshape(-1, mesh.dim + 1))
+
+
+def split_long_edges(
+    mesh: TriangleMesh, length: float, most: int
+) -> tuple[TriangleMesh, Int[np.ndarray, " m"]]:
+    """Split edges at their midpoints until none is longer than a length. No point moves.
+
+    A face becomes four triangles, or two where one of its sides is split. A round that would leave more
+    than `most` vertices is left out.
+
+    Returns the mesh, the old points first, and for each of its vertices a near one of the given mesh.
+    """
+    origins = np.arange(mesh.n_vertices)
+    while True:
+        table = edge_table(mesh)
+        sides = table.face_edges
+        is_split = edge_lengths(mesh) > length
+        # Two sides of a face could be joined in two ways, so the third is split, too.
+        while len(undecided := np.flatnonzero(is_split[sides].sum(axis=1) == 2)):
+            is_split[sides[undecided]] = True
+        ends = table.edges[is_split]
+        if not len(ends) or mesh.n_vertices + len(ends) > most:
+            return mesh, origins
+        numbers = np.full(len(is_split), -1)
+        numbers[is_split] = mesh.n_vertices + np.arange(len(ends))
+        middles = numbers[sides]
+        n_split = is_split[sides].sum(axis=1)
+        whole, quartered = n_split == 0, n_split == 3
+        faces = [mesh.faces[whole], *_quarters(mesh.faces[quartered], middles[quartered])]
+        halved = np.flatnonzero(n_split == 1)
+        first = middles[halved].argmax(axis=1)  # the corner that faces the split side
+        a, b, c = (mesh.faces[halved, (first + step) % 3] for step in range(3))
+        middle = middles[halved].max(axis=1)
+        faces += [np.column_stack([a, b, middle]), np.column_stack([a, middle, c])]
+        points = [mesh.vertices, mesh.vertices[ends].mean(axis=1)]
+        mesh = TriangleMesh(np.concatenate(points), np.concatenate(faces))
+        origins = np.append(origins, origins[ends[:, 0]])
+
+
+def _quarters(
+    faces: Int[np.ndarray, "f 3"], middles: Int[np.ndarray, "f 3"]
+) -> list[Int[np.ndarray, "f 3"]]:
+    """Return the quarters of faces at their corners, and those between, given the midpoint opposite each corner."""
+    (a, b, c), (at_a, at_b, at_c) = faces.T, middles.T
+    corners = [(a, at_c, at_b), (b, at_a, at_c), (c, at_b, at_a), (at_a, at_b, at_c)]
+    return [np.column_stack(quarter) for quarter in corners]
 
 
 @lru_cache

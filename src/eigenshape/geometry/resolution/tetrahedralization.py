@@ -95,7 +95,16 @@ def tetrahedralize(mesh: MeshLike, side_length: float | None = None) -> Simplici
             f"({len(crossing)} pairs). No repair here moves vertices; smooth or remesh it where it "
             "was made."
         )
-    _require_apart(mesh)
+    # Where two vertices are at one place, Netgen may end the process.
+    places = number_places(mesh.vertices)
+    doubles = np.delete(np.arange(mesh.n_vertices), np.unique(places, return_index=True)[1])
+    if doubles.size:
+        one, two = np.flatnonzero(places == places[doubles[0]])[:2]
+        raise InvalidShapeError(
+            f"Vertices of a surface to be filled must differ; {one} and {two} are both at "
+            f"{mesh.vertices[two].tolist()} ({len(doubles)} such). "
+            'Try repair(mesh, ["weld"]), or --repair weld on the command line.'
+        )
     turned = (pieces.sides * (-1) ** pieces.depths < 0)[pieces.of_faces]
     if turned.any() and not turned.all():
         raise InvalidShapeError(
@@ -174,19 +183,6 @@ def _require_closed(mesh: TriangleMesh, pieces: Pieces) -> None:
         "Each edge of a surface to be filled must have two faces of each piece; edge "
         f"{table.edges[worst].tolist()} has {table.n_faces[worst]} ({len(edges)} such). {remedy}"
     )
-
-
-def _require_apart(mesh: TriangleMesh) -> None:
-    """Raise an error if two vertices are at one place: there Netgen may end the process."""
-    places = number_places(mesh.vertices)
-    doubles = np.delete(np.arange(mesh.n_vertices), np.unique(places, return_index=True)[1])
-    if doubles.size:
-        one, two = np.flatnonzero(places == places[doubles[0]])[:2]
-        raise InvalidShapeError(
-            f"Vertices of a surface to be filled must differ; {one} and {two} are both at "
-            f"{mesh.vertices[two].tolist()} ({len(doubles)} such). "
-            'Try repair(mesh, ["weld"]), or --repair weld on the command line.'
-        )
 
 
 def _is_bounded_by(solid: SimplicialMesh, surface: TriangleMesh) -> bool:
