@@ -3,10 +3,12 @@ import sys
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
 
 from certeig.kit.arrays import finite_values, positive_values, whole_number, whole_numbers
 from certeig.kit.errors import InvalidParameterError
-from eigenshape._arrays import step_number, vertex_values
+from eigenshape._arrays import label_components, step_number, vertex_values
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.mesh import TriangleMesh
@@ -181,3 +183,15 @@ def test_one_row_that_is_broadcast_is_no_shape():
         PointCloud(row)
     assert PointCloud(np.array(row)).n_points == 5
     assert PointCloud(row[:1]).n_points == 1
+
+
+def test_groups_are_those_of_scipy_in_the_order_of_their_first_things():
+    rng = np.random.default_rng(3)
+    for n_links in (0, 30, 60, 200):
+        one, two = rng.integers(0, 80, size=(2, n_links))
+        graph = sp.coo_array((np.ones(n_links), (one, two)), shape=(80, 80))
+        wanted, groups = connected_components(graph, directed=False)
+        count, labels = label_components(80, one, two)
+        assert count == wanted
+        assert (labels == groups).all()
+        assert (np.diff(np.unique(labels, return_index=True)[1]) > 0).all()

@@ -7,13 +7,25 @@ import pytest
 from matched_poses import N_POINTS, N_VERTICES, describe_poses
 
 import eigenshape as es
+from eigenshape.matching import growth
+from eigenshape.matching.evidence import FittedMap
 from eigenshape.matching.fitting import fit_part, plan_fit, plan_rough_fit, slide_part
-from eigenshape.matching.growth import N_FIRST_GROWN, find_maps, fitted_maps, grow_maps
+from eigenshape.matching.growth import (
+    EQUALLY_GOOD,
+    MOST_OF_AREA,
+    MUCH_WORSE,
+    N_FIRST_GROWN,
+    N_GROWN_AGAIN,
+    _is_clear,
+    find_maps,
+    fitted_maps,
+    grow_maps,
+)
 from eigenshape.matching.pairs import patch_differences
 from eigenshape.matching.spectral_refinement import lowest_modes, modes_of_part, smooth_places
 from eigenshape.matching.surface import describe_surface
 from eigenshape.matching.target import N_VIEWS, describe_views
-from eigenshape.matching.turns import is_rigid
+from eigenshape.matching.turns import OTHER_PLACE, is_rigid
 
 
 @pytest.fixture(scope="module")
@@ -97,7 +109,7 @@ def test_only_parts_with_a_rim_are_compared_with_views(surfaces):
     alone = patch_differences(closed, whole)
     assert np.array_equal(patch_differences(closed, seen), alone)
     scan = es.partial_scan(closed.mesh, [0, 0, 1]).mesh
-    part = describe_surface(scan, 1.0, N_POINTS)
+    part = describe_surface(es.operators.denoise(scan), 1.0, N_POINTS)
     alone, both = patch_differences(part, whole), patch_differences(part, seen)
     assert (both <= alone).all()
     assert (both < alone).any()
@@ -110,7 +122,7 @@ def test_low_modes_make_a_map_smooth(surfaces):
     rng = np.random.default_rng(3)
     wrong = rng.random(part.mesh.n_vertices) < 0.2
     rough = np.where(wrong, rng.integers(0, N_VERTICES, N_VERTICES), np.arange(N_VERTICES))
-    places, smooth = smooth_places(ours, modes, rough, 20)
+    places, smooth = smooth_places(ours, modes, rough, 20, np.arange(N_VERTICES))
     assert smooth.shape == (N_VERTICES, 20)
     # The poses share their vertices.
     before = np.linalg.norm(whole.mesh.vertices[rough] - whole.mesh.vertices, axis=1)
@@ -123,7 +135,7 @@ def grown(surfaces):
     """A plan to bend what one viewpoint sees of a pose onto the other, differences, and maps."""
     pose, whole = surfaces
     scan = es.partial_scan(pose.mesh, [0.3, 0.2, 1])
-    part = describe_surface(scan.mesh, 1.0, N_POINTS)
+    part = describe_surface(es.operators.denoise(scan.mesh), 1.0, N_POINTS)
     plan, differences = plan_fit(part, whole), patch_differences(part, whole)
     return plan, differences, grow_maps(plan, differences)
 
@@ -148,7 +160,7 @@ def test_a_search_in_a_coarse_part_ends_early_if_no_first_map_fits_well(surfaces
     """All vertices are points: there rough bends say nothing."""
     pose, whole = surfaces
     scan = es.partial_scan(pose.mesh, [0.3, 0.2, 1])
-    part = describe_surface(scan.mesh, 1.0, scan.mesh.n_vertices)
+    part = describe_surface(es.operators.denoise(scan.mesh), 1.0, scan.mesh.n_vertices)
     plan, differences = plan_fit(part, whole), patch_differences(part, whole)
     every = grow_maps(plan, differences)
     few = grow_maps(plan, differences, wanted=0.0)
@@ -166,6 +178,37 @@ def test_a_search_ends_early_if_the_first_maps_are_the_known_one(surfaces):
     misfits = [one.fit.misfit for one in few]
     assert misfits == sorted(misfits)
     assert set(misfits) <= {one.fit.misfit for one in every}
+
+
+def test_other_starts_are_left_out_where_the_first_maps_agree(surfaces, monkeypatch):
+    plan, differences = plan_fit(*surfaces), patch_differences(*surfaces)
+    asked = []
+    monkeypatch.setattr(growth, "grow_starts", lambda *given: asked.append(given) or [])
+    maps = grow_maps(plan, differences)
+    assert not asked
+    assert N_FIRST_GROWN < len(maps) <= N_FIRST_GROWN + N_GROWN_AGAIN
+    ends = plan.whole.mesh.vertices[[one.fit.places for one in maps]]
+    apart = np.linalg.norm(ends - ends[0], axis=2) > OTHER_PLACE
+    assert (apart @ plan.shares < MOST_OF_AREA).all()
+    # A search for other maps than a known one goes on.
+    grow_maps(plan, differences, known=_elsewhere(maps[0]))
+    assert asked
+
+
+def test_evidence_is_clear_unless_a_map_elsewhere_fits_nearly_as_well(surfaces):
+    plan, differences = plan_fit(*surfaces), patch_differences(*surfaces)
+    best = grow_maps(plan, differences)[0]
+    least = max(MUCH_WORSE * best.fit.misfit, EQUALLY_GOOD)
+    nearly, worse = (_elsewhere(best, share * least) for share in (0.9, 1.1))
+    assert _is_clear(plan, [best])
+    assert _is_clear(plan, [best, replace(best), worse])
+    assert not _is_clear(plan, [best, nearly])
+    assert not _is_clear(plan, [])
+
+
+def _elsewhere(one, misfit=0.0):
+    places = np.random.default_rng(0).permutation(one.fit.places)
+    return FittedMap(one.pairs, replace(one.fit, places=places, misfit=misfit))
 
 
 @pytest.mark.long

@@ -86,6 +86,28 @@ def test_frames_become_one_surface_and_what_fits_nowhere_is_left_out(frames, mot
 
 
 @pytest.mark.long
+def test_scans_of_two_poses_become_one_surface_in_the_pose_of_the_first():
+    poses = [es.make_creature("quadruped", pose, n_vertices=3000) for pose in (0, 3)]
+    low, high = np.quantile(poses[0].vertices[:, 0], [0.2, 0.8])
+    heights = poses[0].vertices[:, 0]
+    scans = []
+    for pose, kept in zip(poses, (heights < high, heights > low), strict=True):
+        faces = pose.faces[kept[pose.faces].all(axis=1)]
+        scans.append(es.repair(es.TriangleMesh(pose.vertices, faces), ["drop_unreferenced"]).mesh)
+    fused = es.matching.fuse_scans(scans)
+    assert fused.joined.tolist() == [True, True]
+    assert fused.motions[1] is None
+    assert set(fused.source_scans.tolist()) == {0, 1}
+    whole, first, both = map(es.geometry.surface_area, (poses[0], scans[0], fused.mesh))
+    assert both > 1.05 * first  # what the second scan adds is a fifth of the whole
+    near = es.geometry.closest_points(fused.mesh, poses[0].vertices).points
+    away = np.linalg.norm(near - poses[0].vertices, axis=1)
+    # What only the second scan shows stands in another pose, bent by as little as possible.
+    assert away[heights < high].mean() < 0.01 * np.sqrt(whole)
+    assert away.mean() < 0.04 * np.sqrt(whole)
+
+
+@pytest.mark.long
 def test_one_scan_is_its_own_surface_and_none_is_refused(frames):
     fused = es.matching.fuse_scans(frames[:1])
     assert fused.joined.tolist() == [True]

@@ -20,7 +20,7 @@ def test_a_part_is_described_in_units_of_its_own_size(monkeypatch):
 
     def units_at(size):
         units.clear()
-        [piece] = split_pieces(es.TriangleMesh(size * mesh.vertices, mesh.faces), 0.0)
+        [piece] = split_pieces(es.TriangleMesh(size * mesh.vertices, mesh.faces), 0.0, np.inf)
         scale._find_factor(piece, target)
         return np.array(units)
 

@@ -1,5 +1,8 @@
 """Rigid turns decide between rolls of a long bone and places of an irregular stone."""
 
+from importlib import resources
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
@@ -111,6 +114,30 @@ def test_a_left_hand_is_matched_to_a_right_one_as_its_mirror_image():
     assert never.confidence.mean() < match.confidence.mean()
     always = match_shapes(turned(left), right, mirrored=True)
     assert np.array_equal(always.vertices, match.vertices)
+
+
+@pytest.mark.data
+@pytest.mark.long
+def test_a_left_bone_is_a_mirror_image_of_a_right_one(data):
+    if not (data / "bones").is_dir():
+        pytest.skip(f"no bones in {data}")
+    left, right = (es.read_mesh(data / "bones" / f"talus_{side}v.vtp") for side in "lr")
+    match = match_shapes(left, right)
+    assert match.mirrored
+    assert match.confidence.mean() > 0.9
+    assert not match_shapes(right, right).mirrored
+
+
+@pytest.mark.long
+def test_a_left_hemisphere_is_a_mirror_image_of_the_right_one():
+    data = Path(str(resources.files("neuromodes") / "data"))
+    names = (f"sp-human_tpl-fsLR_den-4k_hemi-{side}_midthickness.surf.gii" for side in "LR")
+    left, right = (es.read_mesh(data / name) for name in names)
+    match = match_shapes(left, right)
+    assert match.mirrored
+    assert match.confidence.mean() > 0.9
+    # Vertex i of one is vertex i of the other.
+    assert (gaps(match, right, right.vertices) < 0.05).mean() > 0.95
 
 
 def test_a_wrong_word_for_mirrored_is_refused():

@@ -106,8 +106,6 @@ def as_mesh(value: object, name: str = "mesh") -> TriangleMesh:
     >>> es.as_mesh(([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]))
     TriangleMesh(3 vertices, 1 faces)
     """
-    if isinstance(value, TriangleMesh):
-        return value
     shape = _convert(value)
     if isinstance(shape, TriangleMesh):
         return shape
@@ -121,8 +119,6 @@ def as_simplicial(value: object, name: str = "mesh") -> Mesh:
 
     Errors are those of `as_mesh`.
     """
-    if isinstance(value, TriangleMesh | SimplicialMesh):
-        return value
     shape = _convert(value)
     if isinstance(shape, TriangleMesh | SimplicialMesh):
         return shape
@@ -158,8 +154,6 @@ def as_shape(value: object, name: str = "shape") -> Shape:
     >>> es.geometry.as_shape(([[0, 0], [1, 0], [0, 1]], [[0, 1, 2]]))
     SimplicialMesh(3 points in R^2, 1 simplices of dimension 2)
     """
-    if isinstance(value, TriangleMesh | SimplicialMesh | PointCloud):
-        return value
     shape = _convert(value)
     if shape is not None:
         return shape

@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from eigenshape._corners import scaled_corners
-from eigenshape._vectors import area_vectors, unit_vectors
+from eigenshape._vectors import area_vectors, row_dots, sum_rows, unit_vectors
 from eigenshape.geometry.facets import corner_fans
 from eigenshape.geometry.measure import face_normals
 from eigenshape.geometry.mesh import TriangleMesh
@@ -30,13 +30,13 @@ def smooth_pairs(mesh: TriangleMesh) -> Bool[np.ndarray, " p"]:
     normals = face_normals(mesh)
     pairs, _ = edge_table(mesh).face_pairs
     one, two = normals[pairs].transpose(1, 0, 2)
-    cosines = np.einsum("pi,pi->p", one, two)
+    cosines = row_dots(one, two)
     cosines[~(one.any(axis=1) & two.any(axis=1))] = 1.0
     if not len(cosines):
         return np.ones(0, dtype=bool)
     quartile = np.degrees(np.arccos(min(np.quantile(cosines, 0.75), 1.0)))
     limit = np.clip(TIMES_QUARTILE * quartile, LEAST_TURN, LARGEST_TURN)
-    return np.asarray(cosines >= np.cos(np.radians(limit)))
+    return cosines >= np.cos(np.radians(limit))
 
 
 def corner_normals(mesh: TriangleMesh) -> Float[np.ndarray, "f 3 3"]:
@@ -48,5 +48,4 @@ def corner_normals(mesh: TriangleMesh) -> Float[np.ndarray, "f 3 3"]:
     """
     points, fans = corner_fans(mesh, smooth_pairs(mesh))
     vectors = np.repeat(area_vectors(scaled_corners(mesh)[0]), 3, axis=0)
-    sums = [np.bincount(fans, weights, minlength=len(points)) for weights in vectors.T]
-    return unit_vectors(np.column_stack(sums))[fans].reshape(-1, 3, 3)
+    return unit_vectors(sum_rows(fans, vectors, len(points)))[fans].reshape(-1, 3, 3)

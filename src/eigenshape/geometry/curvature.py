@@ -7,7 +7,7 @@ from jaxtyping import Float, Int
 from certeig.kit.arrays import ReadOnly, record
 from eigenshape._corners import face_angles, in_length
 from eigenshape._errors import InvalidShapeError
-from eigenshape._vectors import scale_to_unit
+from eigenshape._vectors import row_dots, scale_to_unit
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import vertex_normals
 from eigenshape.geometry.mesh import TriangleMesh
@@ -213,7 +213,7 @@ def _fit_jets(
     offsets = points[near.indices] - points[rows[owners]]
     local = np.einsum("pij,pj->pi", frames[owners], offsets)
     # Divided by the radius of each neighborhood, so that all monomials are of size 1.
-    squares = np.einsum("pi,pi->p", local, local)
+    squares = row_dots(local, local)
     radii = np.sqrt(np.maximum.reduceat(squares, near.indptr[:-1]))
     u, v, heights = (local / radii[owners, None]).T
     # A few neighbors do not determine a cubic: its coefficients are then left out.

@@ -6,7 +6,7 @@ from jaxtyping import Bool, Int
 from eigenshape._arrays import label_components
 from eigenshape._corners import shared_facets
 from eigenshape._errors import InvalidShapeError
-from eigenshape._vectors import size_one
+from eigenshape._vectors import row_dots, size_one
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.facet_lists import FacetTable
 from eigenshape.geometry.mesh import TriangleMesh
@@ -90,7 +90,7 @@ def boundary_surface(mesh: MeshLike) -> TriangleMesh:
     points, _ = size_one(solid.points)
     a, b, c = (points[corner] for corner in triangles.T)
     inside = points[solid.simplices[owner, apex]]
-    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), inside - a) > 0
+    inward = row_dots(np.cross(b - a, c - a), inside - a) > 0
     triangles[inward] = triangles[inward][:, ::-1]
     used, renumbered = np.unique(triangles, return_inverse=True)
     return TriangleMesh(solid.points[used], renumbered.reshape(-1, 3))

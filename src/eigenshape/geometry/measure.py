@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 from eigenshape._corners import in_length, mean_normals, scaled_corners
-from eigenshape._vectors import area_vectors, size_one, triangle_areas, unit_vectors
+from eigenshape._vectors import area_vectors, row_dots, size_one, triangle_areas, unit_vectors
 from eigenshape.geometry.cloud import Shape
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.requirements import require_oriented
@@ -63,7 +63,6 @@ def surface_area(mesh: MeshLike) -> float:
     >>> es.geometry.surface_area(es.shapes.grid(4, 4, width=2, height=3))
     6.0
     """
-    mesh = as_mesh(mesh)
     return float(face_areas(mesh).sum())
 
 
@@ -97,7 +96,7 @@ def enclosed_volume(mesh: MeshLike) -> float:
     require_oriented(mesh)
     corners, scale = scaled_corners(mesh)
     a, b, c = (corners - corners.mean(axis=(0, 1))).transpose(1, 0, 2)
-    return float(in_length(np.einsum("ij,ij->i", a, np.cross(b, c)) / 6, scale, 3).sum())
+    return float(in_length(row_dots(a, np.cross(b, c)) / 6, scale, 3).sum())
 
 
 def face_normals(mesh: MeshLike) -> Float[np.ndarray, "f 3"]:

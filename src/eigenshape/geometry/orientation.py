@@ -5,7 +5,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from certeig.kit.threads import one_blas_thread
 from eigenshape._corners import mean_normals
-from eigenshape._vectors import scale_to_unit, triangle_areas
+from eigenshape._vectors import row_dots, scale_to_unit, triangle_areas
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.face_turns import turn_faces
 from eigenshape.geometry.measure import enclosed_volume
@@ -70,7 +70,7 @@ def outward_vote(mesh: TriangleMesh) -> float:
         return 0.0
     areas = triangle_areas(points[hull.simplices])
     means = mean_normals(mesh)[hull.simplices].mean(axis=1)
-    return float(areas @ np.einsum("fi,fi->f", means, hull.equations[:, :3]) / areas.sum())
+    return float(areas @ row_dots(means, hull.equations[:, :3]) / areas.sum())
 
 
 def orient_closed_outward(mesh: TriangleMesh) -> TriangleMesh:

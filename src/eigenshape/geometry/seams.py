@@ -6,6 +6,7 @@ import numpy as np
 import scipy  # which loads scipy.spatial where it is used: it takes 0.1 s
 from jaxtyping import Float, Int
 
+from certeig.kit.arrays import TINY
 from eigenshape._arrays import label_components, number_places, sorted_rows
 from eigenshape._corners import side_lengths
 from eigenshape._vectors import size_one
@@ -76,7 +77,7 @@ def _stored_precision(points: Float[np.ndarray, "n d"]) -> Float[np.ndarray, " d
     n_decimals, n_digits = _rounded_digits(values)
 
     def last_digits(numbers: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
-        leading = np.floor(np.log10(np.maximum(numbers, np.finfo(np.float64).tiny)))
+        leading = np.floor(np.log10(np.maximum(numbers, TINY)))
         return np.maximum(10.0**-n_decimals, 10.0 ** (leading - n_digits + 1))
 
     with np.errstate(over="ignore"):

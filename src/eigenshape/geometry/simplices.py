@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 from certeig.kit.arrays import EPS
 from eigenshape._corners import at_points, in_length, scaled_corners, side_lengths, volumes
 from eigenshape._errors import InvalidShapeError
-from eigenshape._vectors import size_one
+from eigenshape._vectors import row_dots, size_one
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.simplicial import Mesh
 
@@ -123,7 +123,7 @@ def degenerate_simplices(mesh: Mesh) -> Int[np.ndarray, " k"]:
     longest = np.zeros(len(corners))
     for first, second in combinations(range(corners.shape[1]), 2):
         side = corners[:, first] - corners[:, second]
-        np.maximum(longest, np.sqrt(np.einsum("sd,sd->s", side, side)), out=longest)
+        np.maximum(longest, np.sqrt(row_dots(side, side)), out=longest)
     return np.flatnonzero(factorial(mesh.dim) * volumes(corners) <= THINNEST * longest**mesh.dim)
 
 

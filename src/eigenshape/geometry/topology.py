@@ -256,7 +256,6 @@ def boundary_loops(mesh: MeshLike) -> list[Int[np.ndarray, " k"]]:
     >>> [loop.tolist() for loop in es.geometry.boundary_loops(es.shapes.grid(1, 1))]
     [[0, 2, 3, 1]]
     """
-    mesh = as_mesh(mesh)
     sides = boundary_edges(mesh)
     leaving: dict[int, list[int]] = {}
     for start, end in sides[::-1].tolist():
@@ -337,7 +336,6 @@ def is_closed(mesh: MeshLike) -> bool:
     >>> es.geometry.is_closed(es.icosphere(1)), es.geometry.is_closed(es.shapes.grid(2, 2))
     (True, False)
     """
-    mesh = as_mesh(mesh)
     return bool((edge_table(mesh).n_faces == 2).all())
 
 

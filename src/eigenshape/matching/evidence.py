@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 from scipy.special import expit
 
-from certeig.kit.arrays import record
+from certeig.kit.arrays import TINY, record
 from eigenshape._corners import at_points
 from eigenshape._vectors import area_vectors, triangle_areas, unit_vectors
 from eigenshape.geometry.measure import edge_lengths, face_areas
@@ -24,7 +24,6 @@ N_OTHERS = 2  # maps of other starts that are compared
 # Mean distance of a point of the surface from the nearest vertex, in mean edges
 BETWEEN_VERTICES = 0.35
 LEAST_MISFIT = 1e-4  # a pair of equal shapes has less, which says no more
-TINY = np.finfo(float).tiny
 # Fitted by experiments/ch7_matching/calibrate.py, which prints how good they are: logistic regression on
 # parts of its tuning half, 52 cuts and scans of cats and horses that a smooth field stretches (22 of them
 # with noise), 8 parts matched to hands, planes, people and teddies, where nothing is right, and, with as

@@ -11,19 +11,12 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
-from scipy.linalg.lapack import dpotrf, dpotrs
 
-from certeig.kit.arrays import record
+from certeig.kit.arrays import TINY, record
 from eigenshape._vectors import nearest_rotations
-from eigenshape.matching.fitting_loops import (
-    add_forces,
-    carry_vertices,
-    fill_stiffness,
-    turn_frames,
-)
+from eigenshape.matching.fitting_loops import Carried, Edges, bend_frames, carry_vertices
 from eigenshape.matching.match_loops import nearest_rows
-from eigenshape.matching.nearest import RowTree
-from eigenshape.matching.surface import Surface
+from eigenshape.matching.surface import NORMAL_LENGTH, Surface
 
 N_LINKS = 6  # nearest points that a frame stays alike to
 N_CARRIERS = 4  # frames that carry a vertex
@@ -32,8 +25,6 @@ N_ROUGH_FRAMES, N_ROUGH_SAMPLES = 100, 200  # of a rough bend
 # How much neighboring frames resist, beside a pull of 1 in all: ever less, so that large moves come
 # first. Three times more or less changed no error by more than 0.2.
 STIFFNESS = (1.0, 0.3, 0.1, 0.05, 0.03, 0.02, 0.02, 0.02, 0.02, 0.02)
-N_GIVEN = 2  # steps towards where the map places vertices; later ones are towards nearest points
-N_FIRST, N_NEXT = 12, 2  # turns of the frames in the first step, and in each later one
 # Of the best map, the part slides at last: hardly held along the surface, in more and stiffer steps.
 # On 36 hard pairs of the tuning half mean errors fall from 9.3 to 9.0, and from 4.3 to 3.9 where maps
 # are about right. Maps are not compared after that: wrong ones slide into less misfit than right ones
@@ -41,44 +32,47 @@ N_FIRST, N_NEXT = 12, 2  # turns of the frames in the first step, and in each la
 SLIDING_STIFFNESS = (
     (1.0,) * 6 + (0.5,) * 4 + (0.3,) * 4 + (0.1,) * 4 + (0.05, 0.03, 0.02, 0.02, 0.02)
 )
-FREE_SIZES = 0.8, 1.25  # least and most stretch of a frame that costs nothing
-NORMAL_LENGTH = 0.08  # length, in units, that a difference of normals counts for
-SOFT = 0.03  # units from the whole at which the pull on a point is halved
 # Share of a step along the surface; the rest is towards its plane
 ALONG, SLIDING_ALONG = 0.5, 0.1
 LARGEST_GAP = 0.2  # units: longer gaps say no more
-TINY = np.finfo(float).tiny
 
 
 @record
 class FitPlan:
-    """What fits of one part on one whole share: samples, frames and the whole as a tree.
+    """What fits of one part on one whole share: samples and frames.
 
     `frames` are vertices of the part, its first points, which turn and move; `samples` are vertices
     that are pulled onto the whole, each by its share `pull` of their area. Row v of `carriers` holds the frames that
-    carry vertex v, and `portions` how far. Edges go from frame `one` to `two`, both ways, and `graph`
-    is their Laplacian, by which frames hold each other. `arms` are
-    from frames to the samples that they carry, and `links` along edges, both before bending.
+    carry vertex v, and `portions` how far; `arms` go from frames to the samples that they carry. `edges` are
+    the frames at both ends of each edge, by which frames hold each other, both ways; the way from the first
+    to the second; and the Laplacian of this graph. All ways are those before bending.
     Gaps are measured at the vertices `compared`, each of which stands for a share of the area.
     Only the vertices `inner` of the whole draw samples.
     """
 
     part: Surface
     whole: Surface
-    tree: RowTree
     frames: Int[np.ndarray, " m"]
     samples: Int[np.ndarray, " s"]
     pull: Float[np.ndarray, " s"]
     carriers: Int[np.ndarray, "n c"]
     portions: Float[np.ndarray, "n c"]
-    one: Int[np.ndarray, " e"]
-    two: Int[np.ndarray, " e"]
     arms: Float[np.ndarray, "s c 3"]
-    links: Float[np.ndarray, "e 3"]
-    graph: Float[np.ndarray, "m m"]
+    edges: Edges
     compared: Int[np.ndarray, " v"]
     shares: Float[np.ndarray, " v"]
     inner: Bool[np.ndarray, " k"]
+
+    @property
+    def carried(self) -> Carried:
+        """All vertices of the part and their normals, the frames, and how these carry vertices."""
+        return (
+            self.part.mesh.vertices,
+            self.part.normals,
+            self.frames,
+            self.carriers,
+            self.portions,
+        )
 
     def nearest(
         self,
@@ -87,7 +81,7 @@ class FitPlan:
         guess: Int[np.ndarray, " k"] | None = None,
     ) -> tuple[Float[np.ndarray, " k"], Int[np.ndarray, " k"]]:
         """Return how far the nearest vertex of the whole that faces the same way is, and which."""
-        return self.tree.nearest(np.hstack([points, NORMAL_LENGTH * normals]), guess)
+        return self.whole.tree().nearest(np.hstack([points, NORMAL_LENGTH * normals]), guess)
 
 
 @record
@@ -149,17 +143,13 @@ def _plan(
     return FitPlan(
         part,
         whole,
-        RowTree(np.hstack([whole.mesh.vertices, NORMAL_LENGTH * whole.normals])),
         frames,
         samples,
         areas / areas.sum(),
         carriers,
         portions,
-        one,
-        two,
         vertices[samples][:, None] - centers[carriers[samples]],
-        centers[two] - centers[one],
-        np.diag(weights.sum(axis=1)) - weights,
+        (one, two, centers[two] - centers[one], np.diag(weights.sum(axis=1)) - weights),
         compared,
         areas_compared / areas_compared.sum(),
         np.ones(whole.mesh.n_vertices, dtype=bool),
@@ -196,54 +186,26 @@ def bend_part(
     turn = nearest_rotations(products[None])[0]
     turns = np.repeat(turn[None], len(frames), axis=0)
     places = target + (frames - middle) @ turn.T
-    matrix = np.empty(plan.graph.shape)
-    nearest = None
+    bend_frames(
+        plan.carried,
+        (plan.samples, plan.pull, plan.arms),
+        plan.edges,
+        (whole.mesh.vertices, whole.normals, plan.inner),
+        whole.tree(),
+        NORMAL_LENGTH,
+        np.array(stiffnesses),
+        along,
+        targets,
+        turns,
+        places,
+    )
 
-    for step, stiffness in enumerate(stiffnesses):
-        if step >= N_GIVEN:
-            # The nearest points of the whole that face the same way pull, the more the nearer.
-            points, normals = _carry(plan, turns, places, plan.samples)
-            nearest = plan.nearest(points, normals, nearest)[1]
-            planes = whole.normals[nearest]
-            steps = whole.mesh.vertices[nearest] - points
-            flat = np.einsum("si,si->s", steps, planes)[:, None] * planes
-            targets = points + flat + along * (steps - flat)
-            facing = np.clip(np.einsum("si,si->s", normals, planes), 0, 1)
-            pull = plan.pull * plan.inner[nearest] * facing / (1 + (steps**2).sum(axis=1) / SOFT**2)
-        # Move frames so that samples come nearer to their targets, and turn frames to follow.
-        # Frames that nothing pulls are held by a little more than 0.
-        least = 1e-9 / len(frames)
-        fill_stiffness(carriers, portions, pull, plan.graph, stiffness, least, matrix)
-        # The transpose lies in memory as LAPACK wants it, and is overwritten. LAPACK itself: the
-        # checks of `cho_factor` and `cho_solve` take as long as a solve.
-        factor, _ = dpotrf(matrix.T, overwrite_a=True, clean=False)
-        weight = stiffness * 2 / len(plan.one)  # as in `graph`
-        for _ in range(N_FIRST if step == 0 else N_NEXT):
-            right = np.zeros(places.shape)
-            edges = plan.one, plan.two, plan.links, weight
-            add_forces(turns, carriers, portions, plan.arms, pull, targets, *edges, right)
-            places = np.ascontiguousarray(dpotrs(factor, right)[0])
-            turn_frames(places, plan.one, plan.two, plan.links, *FREE_SIZES, turns)
-
-    points, normals = _carry(plan, turns, places, plan.compared)
+    points, normals = np.empty((2, len(plan.compared), 3))
+    carry_vertices(turns, places, plan.carried, plan.compared, points, normals)
     gaps, found = plan.nearest(points, normals)
     gaps = np.minimum(gaps, LARGEST_GAP)
     # Strain: how far edges are from what their frames make of them, as a share of squares
-    moved = places[plan.two] - places[plan.one]
-    wrong = np.einsum("eij,ej->ei", turns[plan.one], plan.links) - moved
-    strain = float((wrong**2).sum() / max(float((plan.links**2).sum()), TINY))
+    one, two, links, _ = plan.edges
+    wrong = np.einsum("eij,ej->ei", turns[one], links) - (places[two] - places[one])
+    strain = float((wrong**2).sum() / max(float((links**2).sum()), TINY))
     return Fit(points, found, gaps, float(plan.shares @ gaps * np.sqrt(strain)))
-
-
-def _carry(
-    plan: FitPlan,
-    turns: Float[np.ndarray, "m 3 3"],
-    places: Float[np.ndarray, "m 3"],
-    vertices: Int[np.ndarray, " v"],
-) -> tuple[Float[np.ndarray, "v 3"], Float[np.ndarray, "v 3"]]:
-    """Return where frames, each a turn times a size at a place, carry vertices, and the normals there."""
-    part = plan.part
-    carried = part.mesh.vertices, part.normals, plan.frames, plan.carriers, plan.portions
-    points, normals = np.empty((2, len(vertices), 3))
-    carry_vertices(turns, places, carried, vertices, points, normals)
-    return points, normals

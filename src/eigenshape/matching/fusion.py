@@ -1,24 +1,32 @@
-"""Join scans of one rigid shape from several sides to one surface."""
+"""Join scans of one shape from several sides to one surface, and bend those in another pose."""
 
 from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
+from scipy.spatial.transform import Rotation
 
 from certeig.kit.arrays import ReadOnly, record
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.progress import Progress
 from certeig.kit.threads import one_blas_thread
+from eigenshape._corners import mean_normals
+from eigenshape.deformation.deform import N_ROUNDS
+from eigenshape.deformation.rigidity import edge_weights, free_part, relax
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.topology import submesh, vertex_components
+from eigenshape.matching.match import match_shapes
 from eigenshape.matching.registration import (
     NO_MOTION,
     Registration,
     describe_scan,
+    fit_motion,
     register_described,
 )
+from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.scans.reconstruction import reconstruct_surface
 
 # Least score of two scans that are joined. Of 50 pairs of frames of shapes that are not round, of the
@@ -37,7 +45,8 @@ class FusedScan(ReadOnly):
     joined : (k,) bool
         Which of the k scans were joined. The others overlap with none of these by enough.
     motions : tuple of k Registration
-        The motion of each scan to its place; none for a scan that was not joined.
+        The motion of each scan to its place; none for a scan that was not joined, or that was bent
+        into the pose of the others.
     scores : (k, k) float
         Score of each pair of scans (`Registration`), symmetric; 1 on the diagonal.
     source_scans, source_vertices : (n,) int
@@ -66,11 +75,16 @@ class FusedScan(ReadOnly):
 
 
 @one_blas_thread()
-def fuse_scans(scans: Sequence[MeshLike], *, progress: Progress | None = None) -> FusedScan:
-    """Join scans of one rigid shape, such as depth scans, to one surface.
+def fuse_scans(
+    scans: Sequence[MeshLike], *, bend: bool = True, progress: Progress | None = None
+) -> FusedScan:
+    """Join scans of one shape, such as depth scans, to one surface.
 
     Each two scans are registered (`register_scans`). The pairs with the best scores that connect
-    most scans place them, and the surface that fits the points and normals of all is computed
+    most scans place them. A scan that no motion places may show the shape in another pose: the region
+    that it shares with a placed scan is found (`match_shapes` with ``overlap="partial"``), laid on
+    that scan, and the rest of the scan is bent along. A scan that shares no region is left out, and
+    the others are joined; see `joined`. The surface that fits the points and normals of all is computed
     (`eigenshape.io.read_surface` makes surfaces of clouds in the same way). Where no scan saw the
     shape, the surface stays open.
 
@@ -79,6 +93,9 @@ def fuse_scans(scans: Sequence[MeshLike], *, progress: Progress | None = None) -
     scans : sequence of k MeshLike
         In one length unit, in any places. Neighbors should share a third of what they show: views
         that are 30 degrees apart do, on most shapes.
+    bend : bool, optional
+        Whether to bend scans that no motion places, which takes about 10 s for each pair that is tried.
+        Pass False if the shape is rigid.
     progress : callable, optional
         Called as progress(fraction_done, message).
 
@@ -127,23 +144,38 @@ def fuse_scans(scans: Sequence[MeshLike], *, progress: Progress | None = None) -
         tell(k + number, "registering")
         found[two, one] = register_described(described[two], described[one])
         found[one, two] = found[two, one].inverse()
-    tell(n_steps - 1, "joining")
     scores = np.eye(k)
     for (one, two), motion in found.items():
         scores[one, two] = motion.score
 
     motions = _placed(k, found)
-    joined = np.array([motion is not None for motion in motions])
-    members = np.flatnonzero(joined)
-    points, normals = [], []
-    for number in members.tolist():
-        scan, motion = described[number], motions[number] or NO_MOTION
-        points.append(motion.move(scan.mesh.vertices + scan.middle))
-        normals.append(scan.normals @ motion.rotation.T)
-    sizes = [len(each) for each in points]
-    made = reconstruct_surface(PointCloud(np.concatenate(points)), np.concatenate(normals))
-    owners = np.repeat(members, sizes)
-    numbers = np.concatenate([np.arange(size) for size in sizes])
+    # Where each scan lies, and which of its vertices are used
+    placed = {}
+    for number, way in enumerate(motions):
+        if way is not None:
+            scan = described[number]
+            mesh = TriangleMesh(way.move(scan.mesh.vertices + scan.middle), scan.mesh.faces)
+            placed[number] = mesh, np.arange(mesh.n_vertices)
+    # What no motion places is bent onto the first placed scan that shares a region with it. The
+    # list grows while it is walked: a bent scan may place others.
+    bases = list(placed) if bend else []
+    for base in bases:
+        for number in range(k):
+            if number in placed:
+                continue
+            tell(n_steps - 1, f"bending scan {number} onto scan {base}")
+            bent = _bend_onto(described[number].mesh, placed[base][0])
+            if bent is not None:
+                placed[number] = bent
+                bases.append(number)
+
+    tell(n_steps - 1, "joining")
+    points = np.concatenate([mesh.vertices for mesh, _ in placed.values()])
+    normals = np.concatenate([mean_normals(mesh) for mesh, _ in placed.values()])
+    made = reconstruct_surface(PointCloud(points), normals)
+    owners = np.repeat(list(placed), [len(numbers) for _, numbers in placed.values()])
+    numbers = np.concatenate([numbers for _, numbers in placed.values()])
+    joined = np.isin(np.arange(k), list(placed))
     tell(n_steps, "")
     return FusedScan(
         made.mesh,
@@ -153,6 +185,30 @@ def fuse_scans(scans: Sequence[MeshLike], *, progress: Progress | None = None) -
         owners[made.source_vertices],
         numbers[made.source_vertices],
     )
+
+
+def _bend_onto(
+    mesh: TriangleMesh, other: TriangleMesh
+) -> tuple[TriangleMesh, Int[np.ndarray, " v"]] | None:
+    """Bend a scan so that what it shares with another one lies there, if they share a region.
+
+    Return it with the numbers of its vertices, without loose pieces that share nothing.
+    """
+    match = match_shapes(mesh, other, overlap="partial")
+    if not match.mapped.any():
+        return None
+    _, labels = vertex_components(mesh)
+    shares = np.isin(labels, labels[match.mapped])
+    mesh, numbers = submesh(mesh, shares[mesh.faces].all(axis=1))
+    fixed, images = match.mapped[numbers], match.pull(other.vertices)[numbers]
+    # The rest first moves along as it is; then edges become as rigid as they can be.
+    motion = fit_motion(mesh.vertices[fixed], images[fixed])
+    start = np.where(fixed[:, None], images, motion.move(mesh.vertices))
+    turn = np.roll(Rotation.from_matrix(motion.rotation).as_quat(), 1)
+    turns = np.tile(turn, (mesh.n_vertices, 1))
+    edges = edge_weights(mesh, cotangent_laplacian(mesh).stiffness)
+    bent = relax(edges, free_part(edges, fixed), mesh.vertices, start, turns, N_ROUNDS)
+    return TriangleMesh(bent, mesh.faces), numbers
 
 
 def _meshes_of(scans: object) -> list[TriangleMesh]:

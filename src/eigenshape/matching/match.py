@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal
+from functools import partial
+from typing import Literal, NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -33,6 +34,7 @@ from eigenshape.matching.pieces import (
     Piece,
     WorkingCopy,
     carry_map,
+    longest_edge,
     report_left_out,
     split_pieces,
 )
@@ -62,9 +64,15 @@ AS_HANDED = 0.9
 # known. All of 46 parts of the tuning half have at least 0.49, and patches were wrong on four.
 CLEAR_VOTE = 0.3
 # Support of the mirror image of the part, as a multiple of that of the part, from which it is matched,
-# too; and by how much the mean confidence of that map must be higher. Left and right hands have 1.3 to 1.9,
-# pairs of one hand 0.4 to 1.1, and two individuals of a bird 1.3.
-MIRROR_HINT, SURER = 1.25, 0.05
+# too. Left bones on right ones have 1.1 to 3.5 (humeri 1.0), left hands on right ones 1.2 to 1.3; of 22 scans
+# of cats, horses, wolves and creatures three have more, up to 1.5.
+MIRROR_HINT = 1.05
+# The same where nothing tells the part's outside from its inside: a left hemisphere of 4,000 vertices fits the
+# right one badly either way, and its mirror image has 2.1.
+CLEAR_HINT = 1.5
+# It is kept if bending leaves less than this share of the misfit (left on right 0.0 to 0.3, these scans
+# 0.8 to 1.3), or if its mean confidence is so much higher: on two sides of an animal it is by 0.15.
+CLOSER, SURER = 0.6, 0.3
 # A piece of the whole with less free area than this share of a piece of the part is taken.
 FREE = 0.5
 Overlap = Literal["full", "partial"]
@@ -100,7 +108,8 @@ def match_shapes(
     4. Of each start, the largest continuous piece is kept and grown over the rest, twice. The part is
        bent onto the whole by each of these maps: first to where the map places its points, then to
        the nearest points that face the same way (non-rigid registration). The map after which the
-       smallest gaps are left with the least strain is taken.
+       smallest gaps are left with the least strain is taken. Four of the nine come first: if no map
+       elsewhere is nearly as good as the best of them, the other starts are left out.
     5. The four best maps are grown and bent again, and the best one, and others elsewhere that are
        about as good, also from where they lie after 60 eigenfunctions of both shapes made them
        smooth. From there the part slides: it is bent once more, nearly free to move along the surface.
@@ -128,9 +137,9 @@ def match_shapes(
         both the root and "known" are tried.
     mirrored : "auto", True or False
         Whether the part is matched as its mirror image, as a left hand to a right one. "auto" tries that,
-        too, where the patches of the mirror image support each other better by a third, and keeps
-        the surer map; `ShapeMatch.mirrored` and the report say so. Of parts that overlap, the
-        mirror image is matched only on request.
+        too, where the patches of the mirror image support each other a little better, and keeps it
+        if bending leaves much less of it apart, or its map is much surer; `ShapeMatch.mirrored` and
+        the report say so. Of parts that overlap, the mirror image is matched only on request.
     overlap : "full" or "partial"
         "full": all of the part lies on the whole. "partial": each of the two shapes has regions that
         the other one lacks. The region that both have is found, and the map in it; no vertex has a
@@ -164,7 +173,8 @@ def match_shapes(
     Nothing is found where part and whole have nothing in common, but a map is returned all the
     same: look at `confidence`, or pass overlap="partial". If the shape can be turned into itself,
     there are several maps: look at `n_equally_good`. A piece of more than 16,000 vertices or with
-    needles is matched by way of a copy with fewer vertices, and the map is transferred. A part
+    needles is matched by way of a copy with fewer vertices, one with edges longer than 0.06 roots of the
+    larger area by way of a copy in which these are split, and the map is transferred. A part
     of 5,000 vertices takes 2 to 4 s on one core, by the machine.
 
     Examples
@@ -194,12 +204,15 @@ def match_shapes(
     tell(0.0, "prepare the whole")
     target = as_target(whole)
     # Even a part that is as large as it may be has its large pieces among these.
-    pieces = split_pieces(mesh, LEAST_AREA / MOST_AREA)
+    split = partial(
+        split_pieces, least=LEAST_AREA / MOST_AREA, longest=longest_edge(mesh, target.mesh)
+    )
+    pieces = split(mesh)
     image = TriangleMesh(mesh.vertices * [-1, 1, 1], mesh.faces[:, ::-1])
     if is_partial:
         tell(0.5, "match")
         in_mirror = mirrored is True
-        largest = split_pieces(image if in_mirror else mesh, LEAST_AREA / MOST_AREA)[0]
+        largest = (split(image) if in_mirror else pieces)[0]
         found = replace(match_overlap(mesh, largest, target, factor), mirrored=in_mirror)
         tell(1.0, "matched")
         return found
@@ -208,18 +221,21 @@ def match_shapes(
     hypotheses = choose_factors(mesh, pieces, target, scale)
     tell(0.5, "match")
 
-    def surest(pieces: Sequence[Piece]) -> tuple[ShapeMatch, float]:
+    def surest(pieces: Sequence[Piece]) -> tuple[ShapeMatch, _Piece]:
         maps = [_match_pieces(mesh, pieces, target, *each) for each in hypotheses]
         return max(maps, key=lambda each: each[0].confidence.mean())
 
     if mirrored is True:
-        found = replace(surest(split_pieces(image, LEAST_AREA / MOST_AREA))[0], mirrored=True)
+        found = replace(surest(split(image))[0], mirrored=True)
     else:
-        found, mirror_support = surest(pieces)
-        if mirrored == "auto" and found.handed and mirror_support > MIRROR_HINT:
-            other, _ = surest(split_pieces(image, LEAST_AREA / MOST_AREA))
-            if other.confidence.mean() > found.confidence.mean() + SURER:
-                said = "the part was matched as its mirror image, of which the map is surer"
+        found, one = surest(pieces)
+        hint = MIRROR_HINT if found.handed else CLEAR_HINT
+        if mirrored == "auto" and one.mirror_support > hint:
+            other, reflected = surest(split(image))
+            # One place of a mirror image is not surer than four places, each of which fits better.
+            surer = reflected.confidence.mean() > one.confidence.mean() + SURER
+            if surer or reflected.misfit < CLOSER * one.misfit:
+                said = "the part was matched as its mirror image, which fits better"
                 found = replace(other, mirrored=True, report=(*other.report, said))
     tell(1.0, "matched")
     return found
@@ -231,6 +247,8 @@ class _Piece:
 
     `confidence` is that without other maps that fit as well, which put each vertex at `n_places`.
     `n_perfect` is the number of those maps, this one among them; 0 if this one fits less well.
+    `mirror_support` is how much better the mirror image is supported, as a ratio, and `misfit` what
+    bending leaves.
     """
 
     faces: Int[np.ndarray, " n"]
@@ -242,6 +260,16 @@ class _Piece:
     handed: bool
     n_perfect: int
     mirror_support: float
+    misfit: float
+
+
+class _Placed(NamedTuple):
+    """A piece of a part, the number of the piece of the whole on which it lies, its map, and where it fits as well."""
+
+    piece: Piece
+    place: int
+    one: _Piece
+    others: list[int]
 
 
 def _match_pieces(
@@ -250,10 +278,10 @@ def _match_pieces(
     target: MatchTarget,
     factor: float,
     report: tuple[str, ...],
-) -> tuple[ShapeMatch, float]:
+) -> tuple[ShapeMatch, _Piece]:
     """Match each piece by itself; tiny ones go where their nearest neighbors in space go.
 
-    Also return how much better the mirror image of the largest piece is supported, as a ratio.
+    Also return the map of the largest piece.
     """
     n = mesh.n_vertices
     faces, weights = np.zeros(n, dtype=np.int64), np.full((n, 3), 1 / 3)
@@ -269,41 +297,23 @@ def _match_pieces(
             "(--scale unknown on the command line)."
         )
     report += report_left_out(mesh, matched, "part") + target.report
-    found: list[_Piece] = []
-    free = [each.piece.area / factor**2 for each in target.pieces]
-    # Pieces of the whole on which a piece of the part fits equally well
-    twins = np.zeros((len(free), len(free)), dtype=bool)
-    n_equally_good = 1
-    for number, piece in enumerate(matched):
-        # A piece of the whole that other pieces cover is only taken if there is no other.
-        roomy = [k for k, area in enumerate(free) if area >= FREE * piece.area] or [0]
-        maps = {k: _match_piece(piece.copy, target.pieces[k], factor) for k in roomy}
-        best = max(maps, key=lambda k: maps[k].quality.score)
-        one = maps[best]
-        free[best] -= piece.area
-        faces[piece.vertices] = target.pieces[best].piece.faces[one.faces]
+    placed = _place_pieces(matched, target, factor)
+    for number, (piece, place, one, others) in enumerate(placed):
+        faces[piece.vertices] = target.pieces[place].piece.faces[one.faces]
         weights[piece.vertices] = one.weights
-        others = [k for k in maps if k != best and one.n_perfect and maps[k].n_perfect]
-        twins[best, others] = twins[others, best] = True
-        if one.n_perfect:
-            # Had a piece before this one taken the twin, this one might lie where that one does.
-            others += [k for k in np.flatnonzero(twins[best]).tolist() if k not in maps]
         # Each of several equally good places is as likely as the others.
-        n_elsewhere = one.n_perfect * len(others)
-        sure[piece.vertices] = one.confidence / (one.n_places + n_elsewhere)
-        n_equally_good = max(n_equally_good, one.n_perfect + n_elsewhere)
+        sure[piece.vertices] = one.confidence / (one.n_places + one.n_perfect * len(others))
         evidence[piece.vertices] = one.evidence
         done[piece.vertices] = True
-        found.append(one)
         if len(target.pieces) > 1:
-            report += (f"piece {number} of the part was placed on piece {best} of the whole",)
+            report += (f"piece {number} of the part was placed on piece {place} of the whole",)
         for other in others:
             report += (f"piece {number} of the part fits piece {other} of the whole as well",)
     if not done.all():
         nearest = np.flatnonzero(done)[cKDTree(mesh.vertices[done]).query(mesh.vertices[~done])[1]]
         faces[~done], weights[~done] = faces[nearest], weights[nearest]
     corners = target.mesh.faces[faces]
-    areas = [piece.area for piece in matched]
+    found, areas = [each.one for each in placed], [piece.area for piece in matched]
 
     def mean(what: str) -> float:
         return float(np.average([getattr(one.quality, what) for one in found], weights=areas))
@@ -319,18 +329,40 @@ def _match_pieces(
         orientation=mean("orientation"),
         coverage=mean("coverage"),
         handed=all(one.handed for one in found),
-        n_equally_good=n_equally_good,
+        n_equally_good=max(1, *(one.n_perfect * (1 + len(others)) for _, _, one, others in placed)),
         scale=factor,
         report=report,
     )
-    return match, found[0].mirror_support
+    return match, found[0]
+
+
+def _place_pieces(pieces: Sequence[Piece], target: MatchTarget, factor: float) -> list[_Placed]:
+    """Place each piece of a part where it fits best among the pieces of the whole."""
+    free = [each.piece.area / factor**2 for each in target.pieces]
+    # Pieces of the whole on which a piece of the part fits equally well
+    twins = np.zeros((len(free), len(free)), dtype=bool)
+    placed = []
+    for piece in pieces:
+        # A piece of the whole that other pieces cover is only taken if there is no other.
+        roomy = [k for k, area in enumerate(free) if area >= FREE * piece.area] or [0]
+        maps = {k: _match_piece(piece.copy, target.pieces[k], factor) for k in roomy}
+        best = max(maps, key=lambda k: maps[k].quality.score)
+        one = maps[best]
+        free[best] -= piece.area
+        others = [k for k in maps if k != best and one.n_perfect and maps[k].n_perfect]
+        twins[best, others] = twins[others, best] = True
+        if one.n_perfect:
+            # Had a piece before this one taken the twin, this one might lie where that one does.
+            others += [k for k in np.flatnonzero(twins[best]).tolist() if k not in maps]
+        placed.append(_Placed(piece, best, one, others))
+    return placed
 
 
 def _match_piece(copy: WorkingCopy, target: TargetPiece, factor: float) -> _Piece:
     """Match a connected part to a connected whole; the steps are those of `match_shapes`."""
     # Step 1: describe the part, and turn it over if it supports the whole better inside out.
     whole = target.surface
-    part = describe_surface(copy.mesh, target.unit / factor, N_PART)
+    part = describe_surface(copy.clean, target.unit / factor, N_PART)
     sides = part, turn_over(part)
     both = map_in_threads(lambda side: patch_differences(side, whole), sides)
     upright, turned = map_in_threads(
@@ -341,7 +373,8 @@ def _match_piece(copy: WorkingCopy, target: TargetPiece, factor: float) -> _Piec
     part, differences = sides[is_inside_out], both[is_inside_out]
     # In a mirror, patches are what they were, and directions turn the other way.
     mirrored = replace(part, ways=np.conj(part.ways))
-    mirror_support = first_support(mirrored, whole, differences) / max(upright, turned)
+    # A part of a few points may have no support at all.
+    mirror_support = first_support(mirrored, whole, differences) / (max(upright, turned) or np.inf)
     # Steps 2 to 5: pairs that support each other, starts, bends
     modes = modes_of_part(part.mesh, target.modes)
     plan = plan_fit(part, whole)
@@ -370,6 +403,7 @@ def _match_piece(copy: WorkingCopy, target: TargetPiece, factor: float) -> _Piec
         faces, weights = corners_of_faces(whole.mesh, places)
         sure, evidence = np.zeros(len(places)), np.zeros((len(places), N_COLUMNS))
         n_perfect, n_places = 0, np.ones(len(places))
+    misfit = maps[0].fit.misfit if maps else np.inf
     values = np.column_stack([sure, n_places, evidence])
     faces, weights, values = carry_map(copy, target.piece.copy, faces, weights, values)
     return _Piece(
@@ -382,4 +416,5 @@ def _match_piece(copy: WorkingCopy, target: TargetPiece, factor: float) -> _Piec
         handed,
         n_perfect,
         mirror_support,
+        misfit,
     )

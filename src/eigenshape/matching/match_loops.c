@@ -12,16 +12,6 @@ struct shape {
     const complex64_t *ways;
 };
 
-/* value · a · conj(b), rounded once at the end. */
-static complex64_t turn_between(double value, complex64_t a, complex64_t b) {
-    /* The zeros are the imaginary part of the value: they keep the signs of zeros. */
-    double real = value * a.real - 0.0 * a.imaginary,
-           imaginary = value * a.imaginary + 0.0 * a.real;
-    double b_real = b.real, b_imaginary = -b.imaginary;
-    return (complex64_t){(float)(real * b_real - imaginary * b_imaginary),
-                         (float)(real * b_imaginary + imaginary * b_real)};
-}
-
 enum { BLOCK = 256 };
 
 /* What the couplings of one pair take: its row of the distances of either shape. */
@@ -30,17 +20,34 @@ struct row {
     const float *ours, *theirs;
 };
 
-/* By how much each of up to BLOCK pairs disagrees with the pair of a row, as a share of the slack: from
-   1 on, or no number where a distance is infinite, they do not support each other. Without branches,
-   so that several are computed at once. */
-static void fill_shares(const struct row *row, const int64_t *points, const int64_t *images,
-                        double slack, double least, double longer, double *shares,
-                        int64_t n_pairs) {
+/* How much each of up to BLOCK pairs agrees with the pair of a row: 0 from a share `slack` of the
+   distance on, and where a distance is infinite. Without branches, so that several are computed at
+   once. */
+static void fill_agreements(const struct row *row, const int64_t *points, const int64_t *images,
+                            double slack, double least, double longer, double *agreements,
+                            int64_t n_pairs) {
     for (int64_t j = 0; j < n_pairs; j++) {
         float one = row->ours[points[j]], two = row->theirs[images[j]], apart = one - two;
         double error = absolute(apart) / maximum(maximum(one, two), least);
         error *= one > two ? longer : 1;
-        shares[j] = error < slack && points[j] != row->point ? error / slack : 1;
+        double share = error < slack && points[j] != row->point ? error / slack : 1;
+        agreements[j] = 1 - share * share;
+    }
+}
+
+/* Write value · a · conj(b), rounded once at the end, for directions a on the whole and b on the part
+   towards each of up to BLOCK pairs; real and imaginary parts follow each other. */
+static void fill_turns(const double *values, const complex64_t *theirs, const complex64_t *ours,
+                       const int64_t *images, const int64_t *points, float *restrict turns,
+                       int64_t n_pairs) {
+    for (int64_t j = 0; j < n_pairs; j++) {
+        double a = theirs[images[j]].real, b = ours[points[j]].real;
+        double a_imaginary = theirs[images[j]].imaginary, b_imaginary = -ours[points[j]].imaginary;
+        /* The zeros are the imaginary part of the value: they keep the signs of zeros. */
+        double real = values[j] * a - 0.0 * a_imaginary;
+        double imaginary = values[j] * a_imaginary + 0.0 * a;
+        turns[2 * j] = values[j] > 0 ? (float)(real * b - imaginary * b_imaginary) : 0;
+        turns[2 * j + 1] = values[j] > 0 ? (float)(real * b_imaginary + imaginary * b) : 0;
     }
 }
 
@@ -50,7 +57,7 @@ KERNEL void couple_pairs(const int64_t *points, const int64_t *images, const str
                          const struct shape *whole, double slack, double least, double longer,
                          complex64_t *couplings, int64_t n_pairs, int64_t n_ours,
                          int64_t n_theirs) {
-    double shares[BLOCK];
+    double agreements[BLOCK];
     for (int64_t i = 0; i < n_pairs; i++) {
         int64_t ours = points[i] * n_ours, theirs = images[i] * n_theirs;
         /* The distance of two pairs is that from the later one. */
@@ -58,16 +65,10 @@ KERNEL void couple_pairs(const int64_t *points, const int64_t *images, const str
         struct row later = {points[i], &part->back[ours], &whole->back[theirs]};
         for (int64_t first = 0, end; first < n_pairs; first = end) {
             end = lesser(first + BLOCK, first < i ? i : n_pairs);
-            fill_shares(first < i ? &earlier : &later, &points[first], &images[first], slack, least,
-                        longer, shares, end - first);
-            for (int64_t j = first; j < end; j++) {
-                double share = shares[j - first];
-                complex64_t *coupling = &couplings[i * n_pairs + j];
-                *coupling = (complex64_t){0, 0};
-                if (share < 1)
-                    *coupling = turn_between(1 - share * share, whole->ways[theirs + images[j]],
-                                             part->ways[ours + points[j]]);
-            }
+            fill_agreements(first < i ? &earlier : &later, &points[first], &images[first], slack,
+                            least, longer, agreements, end - first);
+            fill_turns(agreements, &whole->ways[theirs], &part->ways[ours], &images[first],
+                       &points[first], (float *)&couplings[i * n_pairs + first], end - first);
         }
     }
 }

@@ -16,17 +16,17 @@ class RowTree:
     """
 
     def __init__(self, rows: Float[np.ndarray, "n 6"]) -> None:
-        self._levels = ((len(rows) - 1) // LEAF).bit_length()
-        self._order = _leaf_order(rows, self._levels)
-        self._places = np.argsort(self._order)
+        self.levels = ((len(rows) - 1) // LEAF).bit_length()
+        self.order = _leaf_order(rows, self.levels)
+        self._places = np.argsort(self.order)
         self.move(rows)
 
     def move(self, rows: Float[np.ndarray, "n 6"]) -> None:
         """Take the rows from where they are now; searches are right, and the slower the more has changed."""
         self.rows = rows
-        self._ordered = rows[self._order]
-        self._nodes = np.empty(((2 << self._levels) - 1, 2, 6))
-        fill_row_boxes(self._ordered, self._levels, self._nodes)
+        self.ordered = rows[self.order]
+        self.nodes = np.empty(((2 << self.levels) - 1, 2, 6))
+        fill_row_boxes(self.ordered, self.levels, self.nodes)
 
     def nearest(
         self, points: Float[np.ndarray, "*k 6"], guess: Int[np.ndarray, "*k"] | None = None
@@ -35,10 +35,10 @@ class RowTree:
         shape = points.shape[:-1]
         found = np.zeros(shape, dtype=np.int64) if guess is None else self._places[guess]
         squares = np.empty(shape)
-        tree = self._ordered, self._levels, self._nodes
+        tree = self.ordered, self.levels, self.nodes
         points = np.ascontiguousarray(points).reshape(-1, 6)
         find_nearest_rows(points, *tree, found.reshape(-1), squares.reshape(-1))
-        return np.sqrt(squares), self._order[found]
+        return np.sqrt(squares), self.order[found]
 
 
 def _leaf_order(rows: Float[np.ndarray, "n 6"], levels: int) -> Int[np.ndarray, " n"]:

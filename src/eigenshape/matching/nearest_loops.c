@@ -1,5 +1,5 @@
 /* The nearest of points with normals, and the boxes of their tree. Documented in nearest_loops.py. */
-#include "kernels.h"
+#include "matching/nearest.h"
 
 #include "space.h"
 

@@ -13,9 +13,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.spatial import cKDTree
 from scipy.special import expit
-from scipy.stats import rankdata
 
-from certeig.kit.arrays import record
+from certeig.kit.arrays import TINY, record
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.threads import map_in_threads
 from eigenshape._arrays import label_components
@@ -29,7 +28,6 @@ from eigenshape.matching.fitting import (
     LARGEST_GAP,
     SLIDING_ALONG,
     STIFFNESS,
-    TINY,
     Fit,
     FitPlan,
     bend_part,
@@ -142,7 +140,7 @@ def match_overlap(
     """Map the region of a piece that the largest piece of a target has, too."""
     other = target.pieces[0]
     whole = other.surface
-    part = describe_surface(piece.copy.mesh, other.unit / factor, N_PART)
+    part = describe_surface(piece.copy.clean, other.unit / factor, N_PART)
     found, n_equally_good = find_region(part, whole, patch_differences(part, whole))
     is_found = found.worth >= LEAST_WORTH
 
@@ -244,7 +242,7 @@ def find_region(
         rivals = [
             one
             for one in others
-            if one.worth >= LEAST_OF_RIVALS and not _told_apart(plan, differences, best, one)
+            if one.worth >= LEAST_OF_RIVALS and not _are_distinct(plan, differences, best, one)
         ]
         for one in rivals:
             both = best.inside & one.inside
@@ -295,7 +293,7 @@ def _different(whole: Surface, regions: Sequence[Region]) -> list[Region]:
     return found
 
 
-def _told_apart(
+def _are_distinct(
     plan: FitPlan, differences: Float[np.ndarray, "m k"], one: Region, other: Region
 ) -> bool:
     """Return whether patches are clearly more alike in a region than in another one."""
@@ -343,7 +341,7 @@ def _bend(plan: FitPlan, signs: Signs, pairs: Pairs, reach: float) -> Region:
     fit = bend_part(drawn, ends, STIFFNESSES, SLIDING_ALONG)
 
     lies = near[plan.compared] & (fit.gaps < MOST_GAP) & plan.inner[fit.places]
-    is_rough = np.array_equal(plan.compared, part.points)
+    is_rough = _is_rough(plan)
     at = np.arange(len(lies)) if is_rough else part.points
     stretch = _stretches(plan, fit.places[at], lies[at])
     if is_rough:
@@ -353,6 +351,11 @@ def _bend(plan: FitPlan, signs: Signs, pairs: Pairs, reach: float) -> Region:
         inside = _large_pieces(part, lies & (stretch < MOST_STRETCH))
     worth, area = _worth(plan, signs, fit.places, at, inside, stretch)
     return Region(fit, at, inside, stretch, worth, area)
+
+
+def _is_rough(plan: FitPlan) -> bool:
+    """Return whether a fit has places of points alone; of a small part, all vertices may be points."""
+    return np.array_equal(plan.compared, plan.part.points)
 
 
 def _stretches(
@@ -369,7 +372,7 @@ def _stretches(
     )
     if not len(points):
         return np.ones(len(ends))
-    medians = np.ma.median(changes, axis=0)  # type: ignore[no-untyped-call]
+    medians = np.ma.median(changes, axis=0)
     return np.asarray(medians.filled(1.0))
 
 
@@ -388,7 +391,7 @@ def _worth(
         return -np.inf, 0.0
     ranks = signs.ranks[points, plan.whole.nearest[places[at[points]]]]
     rank = np.log(np.median(ranks) + LEAST_RANK)
-    if len(places) == len(at):
+    if _is_rough(plan):
         # Each vertex is with its nearest point.
         places, inside = places[part.nearest], inside[part.nearest]
     explained = _explained_end(part, signs, places, inside)
@@ -412,13 +415,13 @@ def _explained_end(
 
 def _signs(part: Surface, whole: Surface, differences: Float[np.ndarray, "m k"]) -> Signs:
     """Return what tells right regions from wrong ones."""
-    ranks = (rankdata(differences, method="min", axis=1) - 1) / differences.shape[1]
+    n_more_alike = np.array([np.searchsorted(np.sort(row), row) for row in differences])
     meshes = part.mesh, whole.mesh
     near = max(ENDS, *(ENDS_IN_EDGES * edge_lengths(mesh).mean() for mesh in meshes))
     # In a straight line; a closed surface has no vertex near to a boundary.
     trees = [cKDTree(mesh.vertices[boundary_vertices(mesh)]) for mesh in meshes]
     ends = [tree.query(mesh.vertices)[0] < near for tree, mesh in zip(trees, meshes, strict=True)]
-    return Signs(ranks, *ends)
+    return Signs(n_more_alike / differences.shape[1], *ends)
 
 
 def _large_pieces(part: Surface, inside: Bool[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:

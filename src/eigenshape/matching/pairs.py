@@ -7,6 +7,7 @@ from certeig.kit.arrays import record
 from eigenshape._arrays import label_components
 from eigenshape.matching.match_loops import couple_pairs, nearest_rows, place_by_distances
 from eigenshape.matching.surface import Surface, View
+from eigenshape.retrieval.patches.matching import best_supported
 
 # All lengths are in units of `Surface` unless stated.
 N_CANDIDATES = 5  # partners that are tried for each point; ten found nothing more
@@ -23,13 +24,9 @@ START_SLACKS = 0.4, 0.3, 0.2
 SHORTEST = 0.05  # errors of shorter distances are shares of this
 # A distance that is longer on the part counts half: around a hole or a cut paths are longer.
 LONGER = 0.5
-LEAST_SUPPORT = 0.3  # of a pair, as a share of the largest, to be selected
 LEAST_AGREEMENT = 0.7  # the same, of the support by selected pairs, as a share of their median
 FIRST_ROUNDS = 30  # of the iteration from all candidates, at most
 NEXT_ROUNDS = 15  # near the images of the last round
-# The iteration is steady when no support changes by more than so many times the largest: single
-# precision, in which couplings are, has rounding of 3e-7.
-STEADY = 1e-6
 # Rounds in which pairs are cleaned, extended and selected anew. Maps are bent onto the whole
 # afterwards, so that more rounds add little, and more starts more.
 N_GROWTHS = 2
@@ -139,27 +136,10 @@ def select_pairs(
 ) -> tuple[Pairs, Int[np.ndarray, " p"]]:
     """Return the best candidate of each point if it is well supported, and their numbers.
 
-    The support of a candidate is x_i ← |Σ_j c_ij x_j|: those that agree with a pair in distance must
-    also agree in the turn that takes directions on the part to directions on the whole. So pairs of a
-    mirror image, whose turns all differ, get little.
+    Those that agree with a pair in distance must also agree in the turn that takes directions on the
+    part to directions on the whole. So pairs of a mirror image, whose turns all differ, get little.
     """
-    support = np.ones(len(points))
-    for _ in range(rounds):
-        found = np.abs(coupling @ support.astype(np.complex64)).astype(np.float64)
-        # The candidates of one point compete: each is multiplied by its share of the best.
-        best = np.full(points.max() + 1, np.finfo(float).tiny)
-        np.maximum.at(best, points, found)
-        found *= found / best[points]
-        length = np.linalg.norm(found)
-        if length == 0:
-            break
-        before, support = support, found / length
-        if np.abs(support - before).max() <= STEADY * support.max():
-            break
-    order = np.argsort(-support, kind="stable")
-    order = order[support[order] > LEAST_SUPPORT * support[order[0]]]
-    first = np.unique(points[order], return_index=True)[1]
-    chosen = order[np.sort(first)]
+    support, chosen = best_supported(coupling, points, rounds)
     # What only unselected candidates supported goes.
     ours = coupling[np.ix_(chosen, chosen)]
     agreement = np.abs(ours @ support[chosen].astype(np.complex64))
@@ -216,8 +196,8 @@ def place_points(
 
 def _without_conflicts(part: Surface, whole: Surface, pairs: Pairs) -> Pairs:
     """Drop pairs whose place on the whole a better supported pair of a far point has taken."""
-    ours = part.between[np.ix_(pairs.points, pairs.points)]
-    theirs = whole.between[np.ix_(pairs.partners, pairs.partners)]
+    ours = part.between[pairs.points][:, pairs.points]
+    theirs = whole.between[pairs.partners][:, pairs.partners]
     conflicts = (theirs < CROWDED) & (ours > BLOCKED * CROWDED)
     kept = np.zeros(len(pairs.points), dtype=bool)
     conflicting = conflicts.any(axis=1)
@@ -230,8 +210,8 @@ def _without_conflicts(part: Surface, whole: Surface, pairs: Pairs) -> Pairs:
 def _continuous(part: Surface, whole: Surface, pairs: Pairs) -> Pairs:
     """Return the largest set of pairs that is connected by neighbors that keep their distances."""
     n = len(pairs.points)
-    ours = part.between[np.ix_(pairs.points, pairs.points)]
-    theirs = whole.between[np.ix_(pairs.partners, pairs.partners)]
+    ours = part.between[pairs.points][:, pairs.points]
+    theirs = whole.between[pairs.partners][:, pairs.partners]
     near = nearest_rows(ours.T, min(N_NEIGHBORS + 1, n))[:, 1:]
     one, two = np.repeat(np.arange(n), near.shape[1]), near.ravel()
     longest = np.maximum(ours[one, two], theirs[one, two])

@@ -154,8 +154,7 @@ class Scan:
 
 def describe_scan(mesh: TriangleMesh) -> Scan:
     """Turn a scan outward, and describe it."""
-    mesh = orient_outward(mesh)
-    clean = denoise(mesh)
+    clean = denoise(orient_outward(mesh))
     patches = extract_patches(clean, n_views=0, clean=False)
     points = patch_descriptor(patches, PatchRecipe()).points[0]
     middle = clean.vertices.mean(axis=0)
@@ -285,7 +284,7 @@ def _find_motions(first: Scan, second: Scan, unit: float) -> list[Registration]:
         members = np.append(seed, partners)
         # The motion of the group explains further pairs, which determine it better.
         for _ in range(4):
-            motion = _fit_motion(starts[members], ends[members])
+            motion = fit_motion(starts[members], ends[members])
             near = np.linalg.norm(motion.move(starts) - ends, axis=1) < PAIR_REACH * unit
             turned = start_normals @ motion.rotation.T
             near &= np.einsum("pi,pi->p", turned, end_normals) > FACING_COSINE
@@ -297,7 +296,7 @@ def _find_motions(first: Scan, second: Scan, unit: float) -> list[Registration]:
     return [motion for _, motion in found[:N_RATED]]
 
 
-def _fit_motion(starts: Float[np.ndarray, "p 3"], ends: Float[np.ndarray, "p 3"]) -> Registration:
+def fit_motion(starts: Float[np.ndarray, "p 3"], ends: Float[np.ndarray, "p 3"]) -> Registration:
     """Return the motion with the least squares of distances (Kabsch 1976)."""
     middle, target = starts.mean(axis=0), ends.mean(axis=0)
     products = (starts - middle).T @ (ends - target)

@@ -124,7 +124,7 @@ def _find_factor(part: Piece, target: MatchTarget) -> float:
     factors = factors[factors**2 * share <= MOST_AREA]
     best, highest = 1.0, -1.0
     for factor in factors.tolist():
-        surface = describe_surface(mesh, whole.unit / factor, N_PART)
+        surface = describe_surface(part.copy.clean, whole.unit / factor, N_PART)
         differences = patch_differences(surface, whole.surface)
         maps = fitted_maps(plan_fit(surface, whole.surface), differences)
         score = 0.0

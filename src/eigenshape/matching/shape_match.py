@@ -1,5 +1,7 @@
 """A map from a part to a whole, with how sure it is of each vertex."""
 
+from io import BytesIO
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -8,7 +10,10 @@ from numpy.typing import DTypeLike, NDArray
 
 from certeig.kit.arrays import ReadOnly, as_array, record
 from certeig.kit.errors import InvalidParameterError
+from certeig.kit.files import as_path, replace_file
 from certeig.kit.typing import ArrayLike
+
+COLUMNS = "vertex,whole_vertex,face,weight_1,weight_2,weight_3,confidence"
 
 
 @record
@@ -109,6 +114,44 @@ class ShapeMatch(ReadOnly):
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
         """Return `vertices`, so that functions that take a list of vertices take a match."""
         return np.array(self.vertices, dtype=dtype)
+
+    def save(self, path: str | Path) -> None:
+        """Write the map; the file appears complete or not at all.
+
+        Parameters
+        ----------
+        path : path
+            A file that ends in ``.csv`` is a table with a row for each vertex of the part: the
+            nearest vertex of the whole, the face, the weights of its corners, and the confidence.
+            One in ``.txt`` has the nearest vertices alone, one a line. One in ``.npz`` has the
+            arrays vertices, faces, corners, weights and confidence.
+
+        Raises
+        ------
+        InvalidParameterError
+            If the name ends in none of these.
+        OSError
+            If the file cannot be written.
+        """
+        path = as_path(path)
+        suffix = path.suffix.lower()
+        file = BytesIO()
+        if suffix == ".txt":
+            np.savetxt(file, self.vertices, fmt="%d")
+        elif suffix == ".csv":
+            number = np.arange(self.n_vertices)
+            columns = number, self.vertices, self.faces, self.weights, self.confidence
+            formats = "%d,%d,%d,%.6g,%.6g,%.6g,%.4g"
+            np.savetxt(file, np.column_stack(columns), formats, header=COLUMNS, comments="")
+        elif suffix == ".npz":
+            arrays = "vertices", "faces", "corners", "weights", "confidence"
+            np.savez_compressed(file, **{name: getattr(self, name) for name in arrays})
+        else:
+            raise InvalidParameterError(
+                f"A map must be written to a file that ends in .csv, .txt or .npz; {path} ends in "
+                f"{path.suffix!r}."
+            )
+        replace_file(path, file.getvalue())
 
     def pull(
         self, values: ArrayLike

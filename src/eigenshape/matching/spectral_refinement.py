@@ -17,7 +17,9 @@ MODES_PER_VERTEX = 1 / 5  # at most: higher ones of a coarse mesh are no longer 
 SPECTRAL_MARGIN = 1.2
 # Modes of a part are more than its share of the area says, since its boundary is free.
 EXTRA = 1.25, 15
-ROWS_AT_ONCE = 1000  # vertices of which a thread has distances to all others in memory
+ROWS_AT_ONCE = (
+    200  # vertices whose distances to all others a thread has in memory: they fit its cache
+)
 
 
 @record
@@ -53,8 +55,9 @@ def refine_places(
     each vertex goes to the point of the whole whose modes are nearest (Ovsjanikov and others 2012;
     Rodolà and others 2017 for parts): first to a vertex, in the last round to a point of a face.
     """
+    vertices = np.arange(len(places))
     for wanted in N_MODES:
-        places, smooth = smooth_places(part, whole, places, wanted)
+        places, smooth = smooth_places(part, whole, places, wanted, vertices)
         if wanted >= len(whole.eigenvalues):
             break
     theirs = np.ascontiguousarray(whole.functions[:, : smooth.shape[1]])
@@ -87,15 +90,19 @@ def places_in_faces(
 
 
 def smooth_places(
-    part: Modes, whole: Modes, places: Int[np.ndarray, " n"], wanted: int
-) -> tuple[Int[np.ndarray, " n"], Float[np.ndarray, "n k"]]:
-    """Return the vertices of a map that so many modes make smooth, and the smooth modes there."""
+    part: Modes,
+    whole: Modes,
+    places: Int[np.ndarray, " n"],
+    wanted: int,
+    vertices: Int[np.ndarray, " v"],
+) -> tuple[Int[np.ndarray, " v"], Float[np.ndarray, "v k"]]:
+    """Return where a map that so many modes make smooth places vertices, and the smooth modes there."""
     k = min(wanted, len(whole.eigenvalues))
     low = part.eigenvalues < SPECTRAL_MARGIN * whole.eigenvalues[k - 1]
     low[0] = True
     ours, theirs = part.functions[:, low], whole.functions[:, :k]
     matrix = (ours * part.areas[:, None]).T @ theirs[places]
-    smooth = ours @ matrix
+    smooth = ours[vertices] @ matrix
     # Half the digits are enough to find the nearest vertex, and take half the time.
     points = smooth.astype(np.float32)
     columns = np.ascontiguousarray(theirs.T, dtype=np.float32)

@@ -1,20 +1,20 @@
 """Surfaces as matching sees them: points, their patches, and distances and directions from them."""
 
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Complex64, Float, Float32, Int
 
-from certeig.kit.arrays import ReadOnly, record
+from certeig.kit.arrays import TINY, ReadOnly, record
 from eigenshape._corners import mean_normals
-from eigenshape._vectors import unit_vectors
+from eigenshape._vectors import frames_across
 from eigenshape.geometry.distances.geodesic import farthest_points
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.orientation import orient_outward
 from eigenshape.geometry.simplices import dual_volumes
 from eigenshape.geometry.topology import neighbor_links
-from eigenshape.operators.smoothing import denoise
+from eigenshape.matching.nearest import RowTree
 from eigenshape.retrieval.patches.codebook import BASES, default_codebook, whiten_numbers
 from eigenshape.retrieval.patches.patch_loops import (
     HEIGHT_BINS,
@@ -29,6 +29,8 @@ from eigenshape.retrieval.patches.patches import RADII, describe_discs, whole_sh
 # for a cat that curls up to 1.3 for one that stretches.
 UNIT = 1.2
 MATCHED_RADII = RADII[list(BASES)]  # of the discs that are compared, in units
+
+NORMAL_LENGTH = 0.08  # length, in units, that a difference of normals counts for
 
 
 @record
@@ -69,15 +71,18 @@ class Surface(ReadOnly):
         """Area in square units."""
         return float(self.areas.sum())
 
+    def tree(self) -> RowTree:
+        """Return vertices with their normals, in which all fits to a whole look for the nearest ones."""
+        return self._tree
+
+    @cached_property
+    def _tree(self) -> RowTree:
+        return RowTree(np.hstack([self.mesh.vertices, NORMAL_LENGTH * self.normals]))
+
 
 def describe_surface(mesh: TriangleMesh, unit: float, n_points: int) -> Surface:
-    """Clean a surface, scale it, choose points, and describe them.
-
-    Faces are turned outward, and noise is removed as far as it is there, so that patches of a scan
-    compare with those of a clean shape.
-    """
-    clean = denoise(orient_outward(mesh))
-    mesh = TriangleMesh((clean.vertices - clean.vertices.mean(axis=0)) / unit, clean.faces)
+    """Scale a surface that faces outward and has no noise, choose points, and describe them."""
+    mesh = TriangleMesh((mesh.vertices - mesh.vertices.mean(axis=0)) / unit, mesh.faces)
     count = min(n_points, mesh.n_vertices)
     chosen, rows, nearest = farthest_points(mesh, count)
     areas, normals = dual_volumes(mesh), mean_normals(mesh)
@@ -140,15 +145,12 @@ def _directions(
     links = neighbor_links(mesh)
     rings = (links + links @ links)[points].tocsr()
     number = np.repeat(np.arange(len(points)), np.diff(rings.indptr))
-    # At each point, two unit vectors that with the normal form a right-handed frame
-    upward = normals[points]
-    firsts = unit_vectors(np.cross(np.eye(3)[np.abs(upward).argmin(axis=1)], upward))
-    frames = np.stack([firsts, np.cross(upward, firsts)], axis=1)
+    frames = frames_across(normals[points])
     # Unfold the arms into the tangent planes, with their lengths.
     arms = mesh.vertices[rings.indices] - mesh.vertices[points][number]
     flat = np.einsum("eij,ej->ei", frames[number], arms)
     lengths = np.linalg.norm(flat, axis=1)
-    stretch = np.linalg.norm(arms, axis=1) / np.maximum(lengths, np.finfo(float).tiny)
+    stretch = np.linalg.norm(arms, axis=1) / np.maximum(lengths, TINY)
     flat *= stretch[:, None]
     # Least squares by the normal equations of each point, the shortest slope where arms lie on a line
     grams = np.add.reduceat(flat[:, :, None] * flat[:, None], rings.indptr[:-1])

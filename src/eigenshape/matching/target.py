@@ -15,7 +15,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_describable, require_oriented
 from eigenshape.geometry.simplices import dual_volumes
 from eigenshape.geometry.topology import is_closed
-from eigenshape.matching.pieces import Piece, report_left_out, split_pieces
+from eigenshape.matching.pieces import Piece, longest_edge, report_left_out, split_pieces
 from eigenshape.matching.spectral_refinement import Modes, lowest_modes
 from eigenshape.matching.surface import (
     MATCHED_RADII,
@@ -26,7 +26,7 @@ from eigenshape.matching.surface import (
     whiten_discs,
 )
 from eigenshape.retrieval.patches.patches import describe_discs, whole_shares
-from eigenshape.scans.partial import view_of
+from eigenshape.scans.partial import viewer
 
 N_WHOLE = 500  # points of the whole; 1,000 take four times as long for the same error
 # Pieces with less of the area of the whole are not matched: they have too few patches.
@@ -98,7 +98,8 @@ def prepare_target(whole: MeshLike) -> MatchTarget:
     It is turned outward and cleaned of noise, 500 points are described by patches, on the whole and
     on what eight viewpoints see of it, and distances from these to all vertices and 150
     eigenfunctions are computed: about 1 s for 5,000 vertices. A piece of more than 16,000 vertices, or with
-    needles, is represented by a copy with fewer vertices and without needles.
+    needles, is represented by a copy with fewer vertices and without needles, and a coarse one by a copy
+    with shorter edges.
 
     Parameters
     ----------
@@ -132,11 +133,11 @@ def prepare_target(whole: MeshLike) -> MatchTarget:
     """
     mesh = as_mesh(whole, "whole")
     require_matchable(mesh)
-    pieces = split_pieces(mesh, LEAST_AREA)
+    pieces = split_pieces(mesh, LEAST_AREA, longest_edge(mesh))
     prepared = []
     for piece in pieces:
         unit = UNIT * float(np.sqrt(piece.area))
-        surface = describe_surface(piece.copy.mesh, unit, N_WHOLE)
+        surface = describe_surface(piece.copy.clean, unit, N_WHOLE)
         surface = replace(surface, views=describe_views(surface.mesh, surface.points))
         prepared.append(TargetPiece(piece, unit, surface, lowest_modes(surface.mesh)))
     return MatchTarget(mesh, tuple(prepared), report_left_out(mesh, pieces, "whole"))
@@ -149,9 +150,10 @@ def describe_views(mesh: TriangleMesh, points: Int[np.ndarray, " m"]) -> tuple[V
     """
     if not is_closed(mesh):
         return ()
+    see = viewer(mesh)
 
     def describe_view(number: int) -> View:
-        view = view_of(mesh, number)
+        view = see(number)
         piece, sources = view.mesh, view.source_vertices
         seen = np.flatnonzero(np.isin(points, sources))
         chosen = np.searchsorted(sources, points[seen])  # sources ascend

@@ -8,6 +8,7 @@ from scipy.spatial import Delaunay
 from certeig.kit.errors import InvalidParameterError
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.distances.geodesic import (
+    _fans,
     farthest_points,
     geodesic_balls,
     geodesic_distances,
@@ -227,3 +228,54 @@ def test_waves_that_follow_each_other_are_as_if_alone():
     wave(5)
     np.testing.assert_array_equal(wave(77, 0.5), geodesic_waves(mesh)(77, 0.5))
     np.testing.assert_array_equal(wave([8, 70]), geodesic_waves(mesh)([8, 70]))
+
+
+def triangles_in(fans):
+    """Return the triangles at each vertex as fans list them, and three lengths of each, in order."""
+    starts, corners, lengths = fans
+    found = {}
+    for vertex in range(len(starts) - 1):
+        assert lengths[starts[vertex + 1] - 1, 1] == -1
+        for entry in range(starts[vertex], starts[vertex + 1]):
+            if lengths[entry, 1] < 0:
+                continue
+            pairs = zip(corners[entry : entry + 2], lengths[entry : entry + 2, 0], strict=True)
+            (one, to_one), (two, to_two) = sorted(pairs)
+            sizes = found.setdefault((vertex, one, two), [])
+            sizes.append([to_one, to_two, lengths[entry, 1]])
+    return dict(sorted(found.items()))
+
+
+def test_fans_list_each_triangle_once_at_each_corner():
+    ball = icosphere(1)
+    faces = ball.faces.copy()
+    faces[::3] = faces[::3, ::-1]  # neighbors that disagree
+    fins = [[0, faces[0, 1], 5], [0, faces[0, 1], 9], faces[7]]  # edges of three and more faces
+    for mesh in (
+        ball,
+        TriangleMesh(ball.vertices, np.concatenate([faces, fins])),
+        TriangleMesh(ball.vertices, faces[::2]),
+    ):
+        fans, scale = _fans(mesh)
+        places, wanted = mesh.vertices / scale, {}
+        for face in mesh.faces:
+            for corner in range(3):
+                vertex, *others = np.roll(face, -corner).tolist()
+                one, two = sorted(others)
+                ends = places[[one, two, one]] - places[[vertex, vertex, two]]
+                sizes = wanted.setdefault((vertex, one, two), [])
+                sizes.append(np.linalg.norm(ends, axis=1).tolist())
+        found = triangles_in(fans)
+        assert list(found) == sorted(wanted)
+        for triangle, sizes in found.items():
+            np.testing.assert_allclose(sizes, wanted[triangle], rtol=1e-14)
+    # A closed fan names its first neighbor again.
+    assert _fans(ball)[0][0][-1] == 3 * ball.n_faces + ball.n_vertices
+
+
+def test_farthest_points_say_0_where_no_point_is_near():
+    balls = disjoint_union(icosphere(1), icosphere(1))
+    chosen, distances, nearest = farthest_points(balls, 1)
+    assert chosen.tolist() == [balls.n_vertices // 2]  # beyond all of the first ball
+    assert np.isinf(distances).sum() == balls.n_vertices // 2
+    assert not nearest.any()

@@ -103,8 +103,7 @@ def winding_numbers(mesh: MeshLike, points: ArrayLike) -> Float[np.ndarray, " p"
     """
     mesh = as_mesh(mesh)
     corners, places, _ = _scale_both(mesh, points)
-    found: Float[np.ndarray, " p"] = windings(places, corners)
-    return found + 0.0  # no -0.0
+    return windings(places, corners) + 0.0  # no -0.0
 
 
 def signed_distance(mesh: MeshLike, points: ArrayLike) -> Float[np.ndarray, " p"]:

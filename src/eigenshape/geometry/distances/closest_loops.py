@@ -10,16 +10,21 @@ from jaxtyping import Float64, Int64
 
 from certeig.kit.kernels import Out, kernel
 
+Points = Float64[np.ndarray, "n_points 3"]
+Corners = Float64[np.ndarray, "n_faces 3 3"]
+Values = Float64[np.ndarray, " n_points"]
+Numbers = Int64[np.ndarray, " n_points"]
+
 
 def nearest_faces(
-    points: Float64[np.ndarray, "n_points 3"],
-    corners: Float64[np.ndarray, "n_faces 3 3"],
+    points: Points,
+    corners: Corners,
     levels: int,
     nodes: Float64[np.ndarray, "_ 6"],
 ) -> tuple[
-    Int64[np.ndarray, " n_points"],
-    Float64[np.ndarray, "n_points 3"],
-    Float64[np.ndarray, " n_points"],
+    Numbers,
+    Points,
+    Values,
 ]:
     """Return, for each point, its nearest face, the weights of the corners there, and distance²."""
     n = len(points)
@@ -30,23 +35,23 @@ def nearest_faces(
 
 @kernel("n_points", "n_faces")
 def fill_nearest_faces(
-    points: Float64[np.ndarray, "n_points 3"],
-    corners: Float64[np.ndarray, "n_faces 3 3"],
+    points: Points,
+    corners: Corners,
     levels: int,
     nodes: Float64[np.ndarray, "(2<<levels)-1 6"],
-    faces: Out[Int64[np.ndarray, " n_points"]],
-    weights: Out[Float64[np.ndarray, "n_points 3"]],
-    squares: Out[Float64[np.ndarray, " n_points"]],
+    faces: Out[Numbers],
+    weights: Out[Points],
+    squares: Out[Values],
 ) -> None:
     """Fill what `nearest_faces` returns."""
 
 
 def nearest_around(
     points: Float64[np.ndarray, "n_points 3 3"],
-    middles: Float64[np.ndarray, "n_points 3"],
-    starts: Int64[np.ndarray, " n_points"],
-    reach: Float64[np.ndarray, " n_points"],
-    corners: Float64[np.ndarray, "n_faces 3 3"],
+    middles: Points,
+    starts: Numbers,
+    reach: Values,
+    corners: Corners,
     neighbors: Int64[np.ndarray, "n_faces 3"],
 ) -> tuple[Int64[np.ndarray, "n_points 3"], Float64[np.ndarray, "n_points 3 3"]]:
     """Return, for three points each, the nearest of the faces around a start, and weights there.
@@ -64,10 +69,10 @@ def nearest_around(
 @kernel("n_points")
 def fill_nearest_around(
     points: Float64[np.ndarray, "n_points 3 3"],
-    middles: Float64[np.ndarray, "n_points 3"],
-    starts: Int64[np.ndarray, " n_points"],
-    reach: Float64[np.ndarray, " n_points"],
-    corners: Float64[np.ndarray, "n_faces 3 3"],
+    middles: Points,
+    starts: Numbers,
+    reach: Values,
+    corners: Corners,
     neighbors: Int64[np.ndarray, "n_faces 3"],
     visits: Out[Int64[np.ndarray, " n_faces"]],
     waiting: Out[Int64[np.ndarray, " n_faces"]],
@@ -77,9 +82,7 @@ def fill_nearest_around(
     """Fill what `nearest_around` returns; `visits` comes as -1, and `waiting` is scratch."""
 
 
-def windings(
-    points: Float64[np.ndarray, "n_points 3"], corners: Float64[np.ndarray, "n_faces 3 3"]
-) -> Float64[np.ndarray, " n_points"]:
+def windings(points: Points, corners: Corners) -> Values:
     """Return how often faces wind around each point: the sum of their solid angles over 4π."""
     products, turns = np.empty((len(points), 2)), np.empty(len(points), dtype=np.int64)
     multiply_angles(points, corners, products, turns)
@@ -89,9 +92,9 @@ def windings(
 
 @kernel("n_points", "n_faces")
 def multiply_angles(
-    points: Float64[np.ndarray, "n_points 3"],
-    corners: Float64[np.ndarray, "n_faces 3 3"],
+    points: Points,
+    corners: Corners,
     products: Out[Float64[np.ndarray, "n_points 2"]],
-    turns: Out[Int64[np.ndarray, " n_points"]],
+    turns: Out[Numbers],
 ) -> None:
     """Fill complex numbers of which the arguments, plus full turns, are half the solid angles."""

@@ -15,7 +15,12 @@ from eigenshape._arrays import source_points, source_sets
 from eigenshape._corners import in_length, scaled_corners
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
-from eigenshape.geometry.distances.geodesic_loops import choose_farthest, fill_rows, spread_waves
+from eigenshape.geometry.distances.geodesic_loops import (
+    choose_farthest,
+    fill_rows,
+    list_fans,
+    spread_waves,
+)
 from eigenshape.geometry.requirements import require_describable
 from eigenshape.geometry.samples.surface_points import SurfacePoints, require_on
 from eigenshape.geometry.simplices import dual_volumes
@@ -33,8 +38,8 @@ WAVES_OF_ROOM = 2
 # Base points of the sum over the surface: about as many as Hilaga and others (2001) take. Time and
 # memory grow with this number.
 N_BASES = 150
-# Where the triangles at each vertex start, their other two corners, and three lengths of each.
-Fans = tuple[Int[np.ndarray, " n1"], Int32[np.ndarray, "k 2"], Float[np.ndarray, "k 3"]]
+# Where the neighbors of each vertex start, these neighbors, and two lengths of each.
+Fans = tuple[Int[np.ndarray, " n1"], Int32[np.ndarray, " k"], Float[np.ndarray, "k 2"]]
 Wave = Callable[..., Float[np.ndarray, " n"]]
 Rows = Callable[..., Float[np.ndarray, "k n"]]
 
@@ -311,7 +316,8 @@ def farthest_points(
         Geodesic distance from each of them to all vertices, in length; infinite between
         components, and possibly beyond `reach`.
     nearest : (n,) int
-        For each vertex, the position in `chosen` of the nearest chosen vertex.
+        For each vertex, the position in `chosen` of the nearest chosen vertex; 0 in a component
+        that has none.
 
     Raises
     ------
@@ -335,16 +341,13 @@ def farthest_points(
     mesh = as_simplicial(mesh)
     (fans, scale), n = _fans(mesh), mesh.n_points
     count = whole_number(count, "count", 1, n)
-    chosen, least, nearest = np.zeros(count, dtype=np.int64), np.empty(n), np.empty(n, np.int64)
+    chosen, nearest, least = np.empty(count, np.int64), np.empty(n, np.int64), np.empty(n)
     # Each choice waits for the wave before it. So where all distances are wanted, waves that only
     # reach what they come nearest to make the choices, and long ones follow, side by side. The short
     # ones add about a fiftieth.
     everywhere = bool(np.isinf(number_from_zero(reach, "reach")))
     rows = np.empty((0 if everywhere else count, n))
     scratch = _scratch(n), np.empty(n, dtype=np.int64), np.empty(n)
-    # The first one is that farthest from vertex 0.
-    fill_rows(fans, np.inf, chosen[:1], np.array([1]), *scratch, least[None])
-    chosen[0] = least.argmax()
     radius = 0.0 if everywhere else reach / scale
     choose_farthest(fans, radius, *scratch, chosen, least, nearest, rows)
     if everywhere:
@@ -432,26 +435,27 @@ def _scratch(n: int) -> Any:
 
 
 def _fans(mesh: Mesh) -> tuple[Fans, float]:
-    """List the triangles at each vertex: where they start, their other two corners, three lengths.
+    """List the neighbors around each vertex, as the kernels take them, and the scale of lengths.
 
-    The lengths of a triangle are those from the vertex to each other corner and between these two.
-    Also return the scale of these lengths. That a wave computes the places of corners from these anew
-    takes less time than to read them.
+    That a wave computes the places of corners from lengths anew takes less time than to read them.
     """
     if mesh.dim != 2:
         raise InvalidShapeError(
             f"Geodesic distances need a mesh of dimension 2; this one has dimension {mesh.dim}."
         )
     corners, scale = scaled_corners(mesh)
-    turns = [np.roll(np.arange(3), -turn) for turn in range(3)]
-    triples = np.concatenate([mesh.simplices[:, turn] for turn in turns])
-    a, b, c = corners.transpose(1, 0, 2)
-    ab, bc, ca = (np.linalg.norm(side, axis=1) for side in (b - a, c - b, a - c))
-    sides = (ab, ca, bc), (bc, ab, ca), (ca, bc, ab)  # as seen from a, b and c
-    lengths = np.concatenate([np.column_stack(three) for three in sides])
-    order = np.argsort(triples[:, 0], kind="stable")
-    starts = np.searchsorted(triples[order, 0], np.arange(mesh.n_points + 1))
-    return (starts, triples[order, 1:].astype(np.int32), lengths[order]), scale
+    sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+    n, n_corners = mesh.n_points, mesh.simplices.size
+    # Two neighbors a triangle, if each vertex has triangles that share no edge; else about one
+    fans = (
+        np.empty(n + 1, dtype=np.int64),
+        np.empty(2 * n_corners, dtype=np.int32),
+        np.empty((2 * n_corners, 2)),
+    )
+    by_vertex, later = np.empty((2, n_corners), dtype=np.int64)
+    listing = by_vertex, np.empty(n + 1, dtype=np.int64), later, np.full(n, -1), np.zeros(n, int)
+    list_fans(mesh.simplices, sides, listing, fans)
+    return fans, scale
 
 
 def _place(

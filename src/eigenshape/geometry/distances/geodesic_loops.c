@@ -7,12 +7,27 @@ enum { CHILDREN = 4 };                 /* of an entry of the heap: fewer levels 
 static const double ABOVE = 1 + 1e-14; /* more than the rounding of a square */
 static const double LEAST_SQUARE = 0x1p-900; /* smaller ones are not exact to so many digits */
 
-/* Entries starts[v] to starts[v + 1] are the triangles at vertex v: their other two corners, and the
-   lengths from v to each of these and between them. */
+/* Entries starts[v] to starts[v + 1] are the neighbors of vertex v, one after the other around it: each
+   by its number, its distance, and its distance from the next. The last is -1 where no triangle is in
+   between, since there the triangles end or have come full circle. */
 struct fans {
     const int64_t *starts;
-    const int32_t (*corners)[2];
-    const double (*lengths)[3];
+    const int32_t *corners;
+    const double (*lengths)[2];
+};
+
+/* Fans while they are listed. */
+struct open_fans {
+    int64_t *starts;
+    int32_t *corners;
+    double (*lengths)[2];
+};
+
+/* Memory of the listing: the corners of triangles by vertex, and where those of each begin; then, of the
+   vertex whose triangles are in a row, those that start at each neighbor, as chains, and how many end
+   there. Neighbors have -1 and 0 on entry and on return. */
+struct listing {
+    int64_t *corners, *begins, *later, *first, *n_ending;
 };
 
 /* Memory of a wave: for each vertex its distance, whether it is settled, its source, and its place in
@@ -124,47 +139,55 @@ struct crossing {
     double near, far, from_near, from_far, between;
 };
 
-/* When a wave reaches the third corner of a triangle: along the edge or through the triangle, of
-   which *is_flat tells. Nothing after `limit` counts. */
-static double arrival_through(struct crossing at, bool same, double limit, bool *is_flat) {
-    double arrival = at.near + at.from_near, length = at.between;
+/* When a wave reaches the third corner of a triangle through its inside, if not after `limit`. */
+static double arrival_through(struct crossing at, bool same, double limit) {
+    double length = at.between;
     double edge = length > 0 ? length : 1; /* no wave passes through an edge without length */
     /* The place of the corner along the edge between the others, and away from it. */
     double x = (at.from_near * at.from_near - at.from_far * at.from_far + length * length);
     x /= 2 * edge;
     double square = at.from_near * at.from_near - x * x, y = square_root(maximum(square, 0));
-    double flat = same ? through_edge(at.near, at.far, length, x, y, minimum(arrival, limit))
-                       : across_edge(at.near, at.far, length, x, y);
-    *is_flat = flat < arrival;
-    return *is_flat ? flat : arrival;
+    return same ? through_edge(at.near, at.far, length, x, y, limit)
+                : across_edge(at.near, at.far, length, x, y);
 }
 
-/* Send a wave on from a settled vertex through one triangle; return the height of the heap. */
-static inline int64_t cross_triangle(const struct scratch *at, int64_t height, int64_t vertex,
-                                     const int32_t corners[2], const double lengths[3]) {
-    int64_t one = corners[0], two = corners[1], source = at->sender[vertex];
-    double key = at->distance[vertex];
-    bool is_settled = at->settled[one];
-    if (is_settled == at->settled[two]) {
-        if (is_settled) return height;
-        height = arrive(at, height, one, key + lengths[0], source);
-        return arrive(at, height, two, key + lengths[1], source);
+/* Send a wave on from a settled vertex, along its edges and through its triangles; return the height of
+   the heap. */
+static inline int64_t send_on(const struct scratch *at, int64_t height, int64_t vertex,
+                              const struct fans *fans) {
+    double key = at->distance[vertex], side = -1, last_length = 0;
+    int64_t source = at->sender[vertex], last = vertex;
+    bool was_settled = true;
+    for (int64_t entry = fans->starts[vertex]; entry < fans->starts[vertex + 1]; entry++) {
+        int64_t corner = fans->corners[entry];
+        double length = fans->lengths[entry][0];
+        bool is_settled = at->settled[corner];
+        /* One branch: which corners are settled cannot be foreseen. */
+        if (!is_settled & (key + length < at->distance[corner]))
+            height = arrive(at, height, corner, key + length, source);
+        if (side >= 0 && is_settled != was_settled) {
+            int64_t to = is_settled ? last : corner, other = is_settled ? corner : last;
+            double from_near = is_settled ? last_length : length;
+            double between = is_settled ? length : last_length;
+            bool same = source == at->sender[other] && source != FRONT;
+            struct crossing crossing = {key, at->distance[other], from_near, side, between};
+            double flat = arrival_through(crossing, same, at->distance[to]);
+            height = arrive(at, height, to, flat, same ? source : FRONT);
+        }
+        was_settled = is_settled;
+        last = corner;
+        last_length = length;
+        side = fans->lengths[entry][1];
     }
-    int64_t to = is_settled ? two : one, other = is_settled ? one : two;
-    bool same = source == at->sender[other] && source != FRONT, is_flat;
-    struct crossing crossing = {key, at->distance[other], lengths[is_settled], lengths[2],
-                                lengths[!is_settled]};
-    double arrival = arrival_through(crossing, same, at->distance[to], &is_flat);
-    return arrive(at, height, to, arrival, is_flat && !same ? FRONT : source);
+    return height;
 }
 
-/* Have the triangles of a vertex in the cache when it is settled: they wait for memory otherwise. */
-static void fetch_triangles(const struct fans *fans, int64_t vertex) {
+/* Have the neighbors of a vertex in the cache when it is settled: they wait for memory otherwise. */
+static void fetch_neighbors(const struct fans *fans, int64_t vertex) {
     int64_t first = fans->starts[vertex];
     __builtin_prefetch(&fans->corners[first]);
     __builtin_prefetch(&fans->lengths[first]);
     __builtin_prefetch((const char *)&fans->lengths[first] + 64);
-    __builtin_prefetch((const char *)&fans->lengths[first] + 128);
 }
 
 /* Spread a wave from some sources. Write the vertices within the radius and their distances, the
@@ -180,11 +203,9 @@ static int64_t spread(const struct fans *fans, double radius, const int64_t *sou
         reached[n_reached] = vertex;
         distances[n_reached++] = at.keys[0];
         sink_last(&at, --height);
-        if (height) fetch_triangles(fans, at.ids[0]);
+        if (height) fetch_neighbors(fans, at.ids[0]);
         at.settled[vertex] = true;
-        for (int64_t entry = fans->starts[vertex]; entry < fans->starts[vertex + 1]; entry++)
-            height =
-                cross_triangle(&at, height, vertex, fans->corners[entry], fans->lengths[entry]);
+        height = send_on(&at, height, vertex, fans);
     }
     /* Leave the scratch as it was: vertices that were reached are settled or in the heap. */
     for (int64_t i = 0; i < n_reached; i++) {
@@ -193,6 +214,71 @@ static int64_t spread(const struct fans *fans, double radius, const int64_t *sou
     }
     for (int64_t i = 0; i < height; i++) at.distance[at.ids[i]] = INFINITE;
     return n_reached;
+}
+
+/* List the corners of triangles by vertex, each as three times its triangle plus its place there. */
+static void list_corners(const int64_t (*faces)[3], const struct listing *listing, int64_t n_faces,
+                         int64_t n) {
+    int64_t *begins = listing->begins;
+    for (int64_t v = 0; v <= n; v++) begins[v] = 0;
+    for (int64_t corner = 0; corner < 3 * n_faces; corner++)
+        begins[faces[corner / 3][corner % 3]]++;
+    for (int64_t v = 0; v < n; v++) begins[v + 1] += begins[v];
+    /* Now they are the ends, which move to the begins. */
+    for (int64_t corner = 3 * n_faces; corner-- > 0;)
+        listing->corners[--begins[faces[corner / 3][corner % 3]]] = corner;
+}
+
+/* List neighbors from one on, as long as a triangle starts at the latest; return the end of the list. */
+static int64_t follow(const int64_t (*faces)[3], const double (*sides)[3],
+                      const struct listing *listing, int64_t neighbor, const struct open_fans *fans,
+                      int64_t end) {
+    double length = 0;
+    for (int64_t at; (at = listing->first[neighbor]) >= 0; end++) {
+        int64_t corner = listing->corners[at], face = corner / 3, place = corner % 3;
+        listing->first[neighbor] = listing->later[at];
+        fans->corners[end] = (int32_t)neighbor;
+        fans->lengths[end][0] = sides[face][place];
+        fans->lengths[end][1] = sides[face][(place + 1) % 3];
+        neighbor = faces[face][(place + 2) % 3];
+        length = sides[face][(place + 2) % 3];
+    }
+    fans->corners[end] = (int32_t)neighbor;
+    fans->lengths[end][0] = length;
+    fans->lengths[end][1] = -1;
+    return end + 1;
+}
+
+KERNEL void list_fans(const int64_t (*faces)[3], const double (*sides)[3],
+                      const struct listing *listing, const struct open_fans *fans, int64_t n_faces,
+                      int64_t n) {
+    list_corners(faces, listing, n_faces, n);
+    int64_t end = 0, *first = listing->first, *n_ending = listing->n_ending;
+    for (int64_t v = 0; v < n; v++) {
+        fans->starts[v] = end;
+        int64_t begin = listing->begins[v], stop = listing->begins[v + 1];
+        for (int64_t at = stop; at-- > begin;) {
+            int64_t corner = listing->corners[at], face = corner / 3, place = corner % 3;
+            int64_t neighbor = faces[face][(place + 1) % 3];
+            listing->later[at] = first[neighbor];
+            first[neighbor] = at;
+            n_ending[faces[face][(place + 2) % 3]]++;
+        }
+        /* From where no triangle ends, then around what is left. */
+        for (int round = 0; round < 2; round++) {
+            for (int64_t at = begin; at < stop; at++) {
+                int64_t corner = listing->corners[at];
+                int64_t neighbor = faces[corner / 3][(corner + 1) % 3];
+                if (first[neighbor] >= 0 && (round || !n_ending[neighbor]))
+                    end = follow(faces, sides, listing, neighbor, fans, end);
+            }
+        }
+        for (int64_t at = begin; at < stop; at++) {
+            int64_t corner = listing->corners[at];
+            n_ending[faces[corner / 3][(corner + 2) % 3]] = 0;
+        }
+    }
+    fans->starts[n] = end;
 }
 
 KERNEL int64_t spread_waves(const struct fans *fans, double radius, const int64_t *sources,
@@ -230,18 +316,23 @@ KERNEL void choose_farthest(const struct fans *fans, double radius, const struct
                             int64_t *reached, double *distances, int64_t *chosen, double *least,
                             int64_t *nearest, double *rows, int64_t n_starts, int64_t n_chosen,
                             int64_t n_rows) {
-    int64_t n = n_starts - 1, farthest = chosen[0];
-    for (int64_t v = 0; v < n; v++) least[v] = INFINITE;
-    for (int64_t number = 0; number < n_chosen; number++) {
-        chosen[number] = farthest;
+    int64_t n = n_starts - 1, farthest = 0;
+    /* The first is that farthest from vertex 0, which a wave finds before. */
+    for (int64_t number = -1; number < n_chosen; number++) {
+        for (int64_t v = 0; v < n && number <= 0; v++) {
+            least[v] = INFINITE;
+            nearest[v] = 0;
+        }
+        if (number >= 0) chosen[number] = farthest;
         double needed = maximum(radius, least[farthest]);
         int64_t count = spread(fans, needed, &farthest, 1, scratch, reached, distances);
-        if (number < n_rows) fill_row(&rows[number * n], n, reached, distances, count);
+        if (number >= 0 && number < n_rows)
+            fill_row(&rows[number * n], n, reached, distances, count);
         for (int64_t i = 0; i < count; i++) {
             int64_t v = reached[i];
             if (!(distances[i] < least[v])) continue;
             least[v] = distances[i];
-            nearest[v] = number;
+            nearest[v] = greater(number, 0);
         }
         farthest = 0;
         for (int64_t v = 1; v < n; v++) farthest = least[v] > least[farthest] ? v : farthest;

@@ -1,7 +1,8 @@
 """Kernels of `geodesic`: waves that start at some vertices and cross unfolded triangles.
 
-`fans` holds `starts`, `corners` and `lengths`. Entries starts[v] to starts[v + 1] are the triangles at
-vertex v: their other two corners, and the lengths from v to each of these and between them.
+`fans` holds `starts`, `corners` and `lengths`. Entries starts[v] to starts[v + 1] are the neighbors of
+vertex v, one after the other around it: each by its number, its distance, and its distance from the
+next, which is -1 where no triangle is in between.
 
 `scratch` holds, for each vertex: its distance (infinite on entry and on return), whether it is settled
 (False on entry and on return), its source, and its place in the heap; then the keys and vertices of
@@ -13,15 +14,41 @@ from jaxtyping import Bool, Float64, Int32, Int64
 
 from certeig.kit.kernels import Out, kernel
 
-Fans = tuple[Int64[np.ndarray, " n_starts"], Int32[np.ndarray, "k 2"], Float64[np.ndarray, "k 3"]]
+Values = Float64[np.ndarray, " n_starts-1"]
+Numbers = Int64[np.ndarray, " n_starts-1"]
+
+Fans = tuple[Int64[np.ndarray, " n_starts"], Int32[np.ndarray, " k"], Float64[np.ndarray, "k 2"]]
 Scratch = tuple[
-    Out[Float64[np.ndarray, " n_starts-1"]],
+    Out[Values],
     Out[Bool[np.ndarray, " n_starts-1"]],
-    Out[Int64[np.ndarray, " n_starts-1"]],
-    Out[Int64[np.ndarray, " n_starts-1"]],
-    Out[Float64[np.ndarray, " n_starts-1"]],
-    Out[Int64[np.ndarray, " n_starts-1"]],
+    Out[Numbers],
+    Out[Numbers],
+    Out[Values],
+    Out[Numbers],
 ]
+
+
+@kernel("n_faces", "n")
+def list_fans(
+    faces: Int64[np.ndarray, "n_faces 3"],
+    sides: Float64[np.ndarray, "n_faces 3"],
+    listing: tuple[
+        Out[Int64[np.ndarray, " n_faces*3"]],
+        Out[Int64[np.ndarray, " n+1"]],
+        Out[Int64[np.ndarray, " n_faces*3"]],
+        Out[Int64[np.ndarray, " n"]],
+        Out[Int64[np.ndarray, " n"]],
+    ],
+    fans: tuple[
+        Out[Int64[np.ndarray, " n+1"]],
+        Out[Int32[np.ndarray, " n_faces*6"]],
+        Out[Float64[np.ndarray, "n_faces*6 2"]],
+    ],
+) -> None:
+    """List the fans of triangles, of which `sides` has the lengths: from corner 0 to 1, 1 to 2 and 2 to 0.
+
+    `listing` is scratch. Its last two arrays have -1 and 0 for each vertex on entry.
+    """
 
 
 @kernel("n_starts", "n_sources", "room")
@@ -48,8 +75,8 @@ def fill_rows(
     sources: Int64[np.ndarray, " _"],
     ends: Int64[np.ndarray, " n_rows"],
     scratch: Scratch,
-    reached: Out[Int64[np.ndarray, " n_starts-1"]],
-    distances: Out[Float64[np.ndarray, " n_starts-1"]],
+    reached: Out[Numbers],
+    distances: Out[Values],
     rows: Out[Float64[np.ndarray, "n_rows n_starts-1"]],
 ) -> None:
     """Write the distances of all vertices from each set of sources, infinite beyond `radius`.
@@ -63,14 +90,14 @@ def choose_farthest(
     fans: Fans,
     radius: float,
     scratch: Scratch,
-    reached: Out[Int64[np.ndarray, " n_starts-1"]],
-    distances: Out[Float64[np.ndarray, " n_starts-1"]],
+    reached: Out[Numbers],
+    distances: Out[Values],
     chosen: Out[Int64[np.ndarray, " n_chosen"]],
-    least: Out[Float64[np.ndarray, " n_starts-1"]],
-    nearest: Out[Int64[np.ndarray, " n_starts-1"]],
+    least: Out[Values],
+    nearest: Out[Numbers],
     rows: Out[Float64[np.ndarray, "n_rows n_starts-1"]],
 ) -> None:
-    """Choose vertices from `chosen[0]` on, each as far as possible from those before.
+    """Choose vertices, each as far as possible from those before, and the first from vertex 0.
 
     Write also the distance of each vertex from the nearest of them, by number, and as many rows of
     distances from each as `rows` has. Waves end at `radius`, but no earlier than they come nearest.

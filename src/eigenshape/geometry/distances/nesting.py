@@ -5,7 +5,7 @@ from jaxtyping import Bool, Float, Int
 
 from certeig.kit.arrays import ReadOnly, record
 from eigenshape._corners import scaled_corners
-from eigenshape._vectors import size_one, triangle_areas
+from eigenshape._vectors import row_dots, size_one, triangle_areas
 from eigenshape.geometry.distances.closest_loops import nearest_faces
 from eigenshape.geometry.distances.crossing_loops import box_tree, curve_places, face_boxes
 from eigenshape.geometry.distances.crossings import round_finely
@@ -113,7 +113,7 @@ def _side(corners: Float[np.ndarray, "f 3 3"]) -> int:
     # The piece gets size 1, so that the volume of a tiny one does not underflow.
     local, _ = size_one(corners - corners.mean(axis=(0, 1)))
     a, b, c = local.transpose(1, 0, 2)
-    volume = float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum()) / 6
+    volume = float(row_dots(a, np.cross(b, c)).sum()) / 6
     area = float(triangle_areas(local).sum())
     return int(np.sign(volume)) if abs(volume) > NEGLIGIBLE_VOLUME * area**1.5 else 0
 

@@ -187,7 +187,8 @@ def shape_quadrature(shape: ShapeLike, *, n_neighbors: Integer | None = None) ->
         raise InvalidShapeError(
             f"The neighbors of each point must span {dim} dimensions; those of point {flat[0]} at "
             f"{cloud.points[flat[0]].tolist()} do not ({flat.size} such). "
-            f"Check dim, which is {dim}, or pass a larger n_neighbors."
+            f"Check dim, which is {dim}, and that all axes have one unit (degrees and meters do not), or "
+            "pass a larger n_neighbors."
         )
     return Quadrature(cloud.points, in_length(weights, scale, dim), dim)
 
