@@ -320,8 +320,8 @@ def test_folders_that_are_no_index(tmp_path, index):
     with pytest.raises(StoreError, match="must be a readable index; file is not a database"):
         ShapeIndex.open(foreign)
     for version, message in (
-        (4, "must be an index of format 9; it is of format 4, by an older version"),
-        (10, "must be an index of format 9; it is of format 10, by a newer version"),
+        (4, "must be an index of format 10; it is of format 4, by an older version"),
+        (11, "must be an index of format 10; it is of format 11, by a newer version"),
     ):
         with closing(sqlite3.connect(index.folder / store.DATABASE)) as database:
             database.execute(f"PRAGMA user_version = {version}")

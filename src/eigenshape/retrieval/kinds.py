@@ -48,7 +48,8 @@ def describe(mesh: MeshLike, recipe: AnyRecipe | None = None) -> Descriptor:
     ----------
     mesh : MeshLike
         A closed or open surface, of any size and in any pose. Patches of a surface of more than
-        30,000 vertices are those of one that is thinned out to fewer (`extract_patches`).
+        30,000 vertices are those of one that is thinned out to fewer, patches of a coarse one those of one
+        whose long edges are split (`extract_patches`).
     recipe : HeatRecipe or PatchRecipe, optional
         By default patches with the codebook that comes with the library, ``PatchRecipe()``. The
         presets of heat are ``SCALE_FREE`` and ``THESIS``.

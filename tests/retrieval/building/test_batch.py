@@ -7,6 +7,7 @@ import sys
 import textwrap
 import threading
 import time
+import warnings
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from pathlib import Path
 
@@ -389,3 +390,16 @@ def test_a_folder_that_moves_and_a_table_that_changes_are_no_new_shapes(index, t
         "repairs": "drop_unreferenced removed 1 vertex without a face",
     }
     assert index.query(describe(mesh_of(1), RECIPE), where={"height": (1, 3)})[0].name == "a"
+
+
+def warn_of(path):
+    warnings.warn(f"{path.name}: the fields rgba are not read", stacklevel=1)
+    return 1
+
+
+def test_a_warning_of_a_worker_has_no_line_of_code(tmp_path, capfd):
+    todo = items(tmp_path, one="1")
+    assert [outcome.value for _, outcome in run_in_workers(warn_of, todo, Workers(1))] == [1]
+    said = capfd.readouterr().err
+    assert "warning: one: the fields rgba are not read\n" in said
+    assert ".py:" not in said

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.special import logsumexp
 from sklearn.mixture import GaussianMixture
 
 import eigenshape as es
@@ -158,7 +159,7 @@ def test_distances_are_those_of_cosines():
 
 @pytest.mark.long
 def test_a_scan_is_nearest_to_the_view_from_its_side(creatures, book):
-    mesh = es.make_creature("hand", 1, n_vertices=1200)
+    mesh = es.make_creature("hand", 1, n_vertices=4000)  # without long edges, which would be split
     _, *views = extract_patches(mesh, n_views=3, clean=False)
     codes = np.array([round_codes(encode_patches(view, book), CLIP) for view in views])
     for place in range(3):
@@ -183,9 +184,18 @@ def test_too_few_patches_are_refused():
         np.zeros((3, 9, 64), np.float32),
         np.ones((3, 9), np.float32),
         np.arange(3),
-        np.zeros((3, 3), np.float32),
+        *np.zeros((3, 3, 3), np.float32),
     )
     with pytest.raises(
         es.InvalidParameterError, match="takes at least 64 patches; 2 shapes have 6"
     ):
         training.train_codebook([few, few])
+
+
+def test_sums_of_logarithms_are_those_of_scipy():
+    joint = 40 * np.random.default_rng(5).standard_normal((300, 32))
+    wanted = logsumexp(joint, axis=1, keepdims=True)
+    np.testing.assert_allclose(codes.log_sums(joint), wanted, rtol=1e-14)
+    tied = np.array([[2.0, 2.0, -700.0], [-3000.0, -3000.0, -3000.0]])
+    expected = [[2 + np.log(2)], [np.log(3) - 3000]]
+    np.testing.assert_allclose(codes.log_sums(tied), expected, rtol=1e-15)

@@ -193,3 +193,30 @@ def test_odd_queries_are_answered_or_named(index, recipe):
     loose = es.TriangleMesh([*square.vertices, [9, 9, 9]], square.faces)
     with pytest.raises(es.InvalidShapeError, match="vertex 4"):
         es.describe(loose, recipe)
+
+
+def test_a_coarse_mesh_finds_its_shape_among_fine_ones():
+    """Discs hold few vertices of a coarse mesh: their points were unlike those of the same surface, subdivided."""
+    index = es.ShapeIndex.create(None)
+    fine = {kind: es.make_creature(kind, n_vertices=4000) for kind in ("quadruped", "giraffe")}
+    for kind, mesh in fine.items():
+        index.add(kind, mesh, n_views=0)
+    coarse = es.geometry.decimate(fine["quadruped"], 500).mesh
+    found = index.query(coarse, n_matches=2)
+    assert found[0].name == "quadruped"
+    assert found[0].score < 0.2
+    assert not found.nothing_alike
+
+
+def test_a_mesh_and_its_subdivision_have_the_same_codes():
+    coarse = es.geometry.decimate(es.make_creature("hand", n_vertices=500), 150).mesh
+    one, two = (
+        es.describe(each).codes[0].ravel() for each in (coarse, es.geometry.subdivide(coarse))
+    )
+    alike = (
+        one.astype(float)
+        @ two
+        / np.linalg.norm(one.astype(float))
+        / np.linalg.norm(two.astype(float))
+    )
+    assert alike > 0.9

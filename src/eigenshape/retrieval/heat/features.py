@@ -1,7 +1,6 @@
 """Feature points of a mesh, and the heat descriptor that they carry."""
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -25,7 +24,7 @@ from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.laplacian import Laplacian, dirichlet_laplacian
 from eigenshape.retrieval.heat.recipe import SCALE_FREE, HeatRecipe
 from eigenshape.retrieval.heat.score import HeatDescriptor
-from eigenshape.scans.partial import MeshPart, view_of, views_of
+from eigenshape.scans.partial import MeshPart, viewer, views_of
 from eigenshape.spectral.signatures.approximate_heat import approximate_heat_signature
 from eigenshape.spectral.signatures.heat import heat_kernel_signature, reflection_free_signature
 from eigenshape.spectral.solve import solve_spectrum
@@ -270,19 +269,19 @@ def describe_views(mesh: TriangleMesh, recipe: HeatRecipe, n_views: int) -> list
 
     Return nothing for an open shape, which is a part already.
     """
-    return map_in_threads(partial(_describe_view, recipe), views_of(mesh, n_views))
 
+    def describe_view(part: MeshPart) -> HeatDescriptor:
+        descriptor = heat_features(part.mesh, recipe).descriptor
+        return replace(descriptor, vertices=part.source_vertices[descriptor.vertices])
 
-def _describe_view(recipe: HeatRecipe, part: MeshPart) -> HeatDescriptor:
-    descriptor = heat_features(part.mesh, recipe).descriptor
-    return replace(descriptor, vertices=part.source_vertices[descriptor.vertices])
+    return map_in_threads(describe_view, views_of(mesh, n_views))
 
 
 def find_view_features(
     mesh: TriangleMesh, recipe: HeatRecipe, view: int
 ) -> tuple[MeshPart, HeatFeatures]:
     """Return what one of the viewpoints of `describe_views` sees, and its features."""
-    part = view_of(mesh, view)
+    part = viewer(mesh)(view)
     return part, heat_features(part.mesh, recipe)
 
 

@@ -113,6 +113,8 @@ class LabeledShape(ReadOnly):
         Or what `as_mesh` takes.
     labels : (f,) int
         Label of each face. A label means the same on all shapes that are used together.
+    report : tuple of str
+        What was repaired when the shape was read.
 
     Raises
     ------
@@ -134,10 +136,11 @@ class LabeledShape(ReadOnly):
 
     mesh: TriangleMesh
     labels: Int[np.ndarray, " f"]
+    report: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         mesh = as_mesh(self.mesh)
-        labels = face_labels(self.labels, "labels", mesh.n_faces)
+        labels = face_labels(self.labels, "labels", mesh)
         object.__setattr__(self, "mesh", mesh)
         object.__setattr__(self, "labels", freeze(labels.astype(np.int64)))
 

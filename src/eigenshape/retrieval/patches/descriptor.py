@@ -20,6 +20,7 @@ from eigenshape.retrieval.patches.codebook import (
     round_codes,
 )
 from eigenshape.retrieval.patches.matching import PatchPoints, patch_points
+from eigenshape.retrieval.patches.mirror_images import is_mirror_image
 from eigenshape.retrieval.patches.patches import Patches
 from eigenshape.scans.partial import view_number
 
@@ -114,6 +115,23 @@ class PatchDescriptor(ReadOnly):
     def vertices(self) -> Int[np.ndarray, " m"]:
         """Return the vertex of each patch of the whole shape."""
         return self.points[0].vertices
+
+    def is_mirror_image(self, other: "PatchDescriptor") -> bool | None:
+        """Say whether a shape is rather like the mirror image of another one.
+
+        Parameters
+        ----------
+        other : PatchDescriptor
+            By the same codebook.
+
+        Returns
+        -------
+        bool or None
+            None if it cannot be told: both sides are alike, as of an animal, hardly anything agrees, or
+            the surface is a sheet.
+        """
+        require_type(other, PatchDescriptor, "other")
+        return is_mirror_image(self.points[0], other.points[0])
 
 
 def patch_descriptor(patches: Sequence[Patches], recipe: PatchRecipe) -> PatchDescriptor:

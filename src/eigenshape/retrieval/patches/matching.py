@@ -3,10 +3,10 @@
 import zlib
 
 import numpy as np
-from jaxtyping import Float, Float32, Int, UInt8
+from jaxtyping import Complex64, Float, Float32, Int, UInt8
 
 from certeig.kit.arguments import require_type
-from certeig.kit.arrays import ReadOnly, record
+from certeig.kit.arrays import TINY, ReadOnly, record
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.threads import one_blas_thread
 from eigenshape.retrieval.patches.codebook import N_SIZES, PatchCodebook, whiten_patches
@@ -30,14 +30,21 @@ LEAST_ANCHOR_SUPPORT = 0.5
 N_LANDMARKS = 40
 # Distances that a byte tells apart, in sides of the box: 3 % apart, from 0.0002 to 14
 LENGTHS = np.append(0.008 * (1.03 ** np.arange(255) - 1), np.inf).astype(np.float32)
+# The same, of a candidate, to be the best of its point
+LEAST_CANDIDATE_SUPPORT = 0.3
+# Supports of candidates are steady when none changes by more than so many times the largest: single precision,
+# in which couplings are, has rounding of 3e-7.
+STEADY = 1e-6
 N_ANCHORS = 20  # at most; time and memory of the second round grow with it
 # What keeping no distance to the anchors counts as, in median squared distances of numbers
 STRAIN_WEIGHT = 3.0
 # Relative sizes that are tried, in steps of 1.25, no change first
 STEPS = sorted(range(1 - N_SIZES, N_SIZES), key=abs)
 SIZE_STEP = float(RADII[1] / RADII[0])  # 1.25
-# How numbers of points, vertices, and weights are stored
-LENGTH, VERTEX, HALF = np.dtype("<u4"), np.dtype("<u4"), np.dtype("<f2")
+# To which positions in the unit box around the origin, and normals, are rounded: they take two bytes, and one
+PLACE_STEP, NORMAL_STEP = np.float32(2**-14), np.float32(2**-6)
+# How numbers of points, vertices, weights, and places are stored
+LENGTH, VERTEX, HALF, PLACE = (np.dtype(name) for name in ("<u4", "<u4", "<f2", "<i2"))
 
 
 @record
@@ -54,6 +61,9 @@ class PatchPoints(ReadOnly):
         Along the surface, in sides of the box: to the first 40 points in steps of 3 %, and
         between others the mean of the largest and the smallest that these allow.
     vertices : (m,) int
+    places, normals : (m, 3) float32
+        Position in a unit box, and unit normal outward, in steps of 2^-14 and 2^-6. They tell a shape from
+        its mirror image.
 
     See Also
     --------
@@ -72,6 +82,8 @@ class PatchPoints(ReadOnly):
     weights: Float32[np.ndarray, " m"]
     distances: Float32[np.ndarray, "m m"]
     vertices: Int[np.ndarray, " m"]
+    places: Float32[np.ndarray, "m 3"]
+    normals: Float32[np.ndarray, "m 3"]
 
 
 @record
@@ -131,6 +143,8 @@ def patch_points(shape: Patches, codebook: PatchCodebook) -> PatchPoints:
         weights.astype(np.float32),
         distances_by_landmarks(lengths),
         shape.vertices,
+        PLACE_STEP * np.rint(shape.places / PLACE_STEP),
+        NORMAL_STEP * np.rint(shape.normals / NORMAL_STEP),
     )
 
 
@@ -216,7 +230,7 @@ def match_patches(first: PatchPoints, second: PatchPoints) -> PatchMatch:
     """
     require_type(first, PatchPoints, "first")
     require_type(second, PatchPoints, "second")
-    start = _best_start(first, second)
+    start = best_start(first, second)
     costs = squared_distances(first, second, start.step)
     costs = costs + STRAIN_WEIGHT * np.median(costs) * _strain(first, second, start)
     points = _select_supported(_consistent(first, second, costs, start.step), LEAST_SUPPORT)
@@ -227,7 +241,7 @@ def match_patches(first: PatchPoints, second: PatchPoints) -> PatchMatch:
 @one_blas_thread()
 def patch_agreement(first: PatchPoints, second: PatchPoints) -> float:
     """Return the agreement of `match_patches`, which its second round leaves as it is."""
-    return _best_start(first, second).agreement
+    return best_start(first, second).agreement
 
 
 def anchor_strain(
@@ -237,12 +251,12 @@ def anchor_strain(
 
     The size is the `step` of `match_patches`. The strain of a pair is a mean squared error, 0 to 1.
     """
-    start = _best_start(first, second)
+    start = best_start(first, second)
     return start.step, _strain(first, second, start)
 
 
 @record
-class _Matches:
+class Start:
     """Matches at one relative size, the best supported first."""
 
     points: Int[np.ndarray, "p 2"]
@@ -251,7 +265,7 @@ class _Matches:
     step: int
 
 
-def _best_start(first: PatchPoints, second: PatchPoints) -> _Matches:
+def best_start(first: PatchPoints, second: PatchPoints) -> Start:
     """Match by patches alone, at the relative size at which most agrees."""
     if first.numbers.shape[1:] != second.numbers.shape[1:]:
         raise InvalidParameterError(
@@ -266,7 +280,7 @@ def _best_start(first: PatchPoints, second: PatchPoints) -> _Matches:
 
 def _consistent(
     first: PatchPoints, second: PatchPoints, costs: Float32[np.ndarray, "m n"], step: int
-) -> _Matches:
+) -> Start:
     """Match the points that are each other's nearest, and rate the matches by their agreement.
 
     Components are rated one by one, since there is no distance from one to another. Each component
@@ -297,7 +311,7 @@ def _consistent(
             total += float(agreement)
             supports[places] = support
     order = np.argsort(-supports, kind="stable")
-    return _Matches(np.column_stack([rows, columns])[order], supports[order], total, step)
+    return Start(np.column_stack([rows, columns])[order], supports[order], total, step)
 
 
 def _components(points: PatchPoints) -> Int[np.ndarray, " m"]:
@@ -307,24 +321,55 @@ def _components(points: PatchPoints) -> Int[np.ndarray, " m"]:
     return np.isfinite(points.distances).argmax(axis=1)
 
 
-def _select_supported(matches: _Matches, share: float) -> Int[np.ndarray, "p 2"]:
+def _select_supported(matches: Start, share: float) -> Int[np.ndarray, "p 2"]:
     return matches.points[matches.support > share * matches.support.max(initial=0.0)]
 
 
-def _strain(
-    first: PatchPoints, second: PatchPoints, matches: _Matches
-) -> Float32[np.ndarray, "m n"]:
+def _strain(first: PatchPoints, second: PatchPoints, matches: Start) -> Float32[np.ndarray, "m n"]:
     """Return the mean squared error of the distances of each pair to the surest matches, 0 to 1."""
     anchors = _select_supported(matches, LEAST_ANCHOR_SUPPORT)[:N_ANCHORS]
     if not len(anchors):
         return np.zeros((len(first.numbers), len(second.numbers)), dtype=np.float32)
     ours = np.float32(SIZE_STEP**matches.step) * first.distances[:, None, anchors[:, 0]]
     theirs = second.distances[None, :, anchors[:, 1]]
+    return np.asarray(squared_strains(ours, theirs).mean(axis=2))
+
+
+def squared_strains(
+    ours: Float32[np.ndarray, "..."], theirs: Float32[np.ndarray, "..."]
+) -> Float32[np.ndarray, "..."]:
+    """Return squared errors of distances as shares of what is allowed, at most 1; 1 between components."""
     longest = np.maximum(np.maximum(ours, theirs), np.float32(LEAST_LENGTH))
     known = np.isfinite(longest)
     errors = np.subtract(ours, theirs, where=known, out=np.ones_like(longest))
     errors = np.divide(errors, np.float32(SLACK) * longest, where=known, out=errors)
-    return np.asarray(np.minimum(errors**2, 1).mean(axis=2))
+    return np.asarray(np.minimum(errors**2, 1))
+
+
+def best_supported(
+    coupling: Complex64[np.ndarray, "c c"], points: Int[np.ndarray, " c"], rounds: int
+) -> tuple[Float[np.ndarray, " c"], Int[np.ndarray, " p"]]:
+    """Return the support x_i ← |Σ_j c_ij x_j| of candidates, and the best of each point if it is well supported.
+
+    The best come first.
+    """
+    support = np.ones(len(points))
+    for _ in range(rounds):
+        found = np.abs(coupling @ support.astype(np.complex64)).astype(np.float64)
+        # The candidates of one point compete: each is multiplied by its share of the best.
+        best = np.full(points.max() + 1, TINY)
+        np.maximum.at(best, points, found)
+        found *= found / best[points]
+        length = np.linalg.norm(found)
+        if length == 0:
+            break
+        before, support = support, found / length
+        if np.abs(support - before).max() <= STEADY * support.max():
+            break
+    order = np.argsort(-support, kind="stable")
+    order = order[support[order] > LEAST_CANDIDATE_SUPPORT * support[order[0]]]
+    first = np.unique(points[order], return_index=True)[1]
+    return support, order[np.sort(first)]
 
 
 def squared_distances(
@@ -338,13 +383,15 @@ def squared_distances(
 
 
 def pack_points(points: PatchPoints) -> bytes:
-    """Return points as bytes: 16 KB for 150 points with 90 numbers each."""
+    """Return points as bytes: 17 KB for 150 points with 90 numbers each."""
     parts = (
         np.array([*points.numbers.shape], dtype=LENGTH),
         points.vertices.astype(VERTEX),
         points.weights.astype(HALF),
         np.rint(points.numbers / NUMBER_STEP).astype(np.int8),
         nearest_lengths(points.distances[:, :N_LANDMARKS]),
+        np.rint(points.places / PLACE_STEP).astype(PLACE),
+        np.rint(points.normals / NORMAL_STEP).astype(np.int8),
     )
     # Each part is coded apart, since their bytes are distributed differently.
     deflate = zlib.compressobj()
@@ -366,4 +413,6 @@ def unpack_points(data: bytes) -> PatchPoints:
     vertices, weights = take(VERTEX, m).astype(np.int64), take(HALF, m).astype(np.float32)
     numbers = np.float32(NUMBER_STEP) * take(np.dtype("i1"), m * r * d).reshape(m, r, d)
     lengths = LENGTHS[take(np.dtype("u1"), m * min(m, N_LANDMARKS)).reshape(m, -1)]
-    return PatchPoints(numbers, weights, distances_by_landmarks(lengths), vertices)
+    places = PLACE_STEP * take(PLACE, 3 * m).reshape(m, 3)
+    normals = NORMAL_STEP * take(np.dtype("i1"), 3 * m).reshape(m, 3)
+    return PatchPoints(numbers, weights, distances_by_landmarks(lengths), vertices, places, normals)

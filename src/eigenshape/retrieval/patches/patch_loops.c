@@ -127,3 +127,15 @@ KERNEL void fill_discs(const double *rows, const int64_t *centers, const struct 
         }
     }
 }
+
+/* The method of Floyd and Warshall (1962). */
+KERNEL void shorten_paths(double *lengths, int64_t n) {
+    for (int64_t middle = 0; middle < n; middle++) {
+        const double *onward = lengths + middle * n;
+        for (int64_t from = 0; from < n; from++) {
+            double *own = lengths + from * n, first = own[middle];
+            if (first == INFINITE || from == middle) continue;
+            for (int64_t to = 0; to < n; to++) own[to] = minimum(own[to], first + onward[to]);
+        }
+    }
+}

@@ -38,3 +38,8 @@ def sort_by_distance(
     distances: Float64[np.ndarray, " n"], reach: float, order: Out[Int64[np.ndarray, " n"]]
 ) -> int:
     """Write the vertices within reach by distance, equals by index, and return their number."""
+
+
+@kernel("n")
+def shorten_paths(lengths: Out[Float64[np.ndarray, "n n"]]) -> None:
+    """Replace the lengths of direct ways by those of the shortest paths of them."""

@@ -6,7 +6,6 @@ import numpy as np
 import scipy.linalg as sl
 from jaxtyping import Float
 from scipy.cluster.vq import kmeans2
-from scipy.special import logsumexp
 
 from certeig.kit.arguments import require_each
 from certeig.kit.arrays import whole_number
@@ -19,6 +18,7 @@ from eigenshape.retrieval.patches.codebook import (
     N_ENTRIES,
     PatchCodebook,
     log_joint,
+    log_sums,
     standardize,
 )
 from eigenshape.retrieval.patches.patches import Patches
@@ -108,8 +108,9 @@ def _fit_mixture(
         variances = np.maximum(squares - centers**2, LEAST_VARIANCE)
         shares = counts / counts.sum()
         joint = log_joint(points, shares, centers, variances)
-        likelihood = logsumexp(joint, axis=1, keepdims=True)
-        belief, mean = np.exp(joint - likelihood), float(likelihood.mean())
+        likelihood = log_sums(joint)
+        joint -= likelihood
+        belief, mean = np.exp(joint, out=joint), float(likelihood.mean())
         if mean - before < CONVERGED:
             break
         before = mean

@@ -12,6 +12,7 @@ from certeig.kit.errors import InvalidParameterError
 from certeig.kit.text import Shown, html_repr
 from certeig.kit.threads import one_blas_thread
 from eigenshape.retrieval.kinds import Descriptor, pair_points
+from eigenshape.retrieval.patches.descriptor import PatchDescriptor
 from eigenshape.retrieval.search.candidates import Method
 from eigenshape.retrieval.search.chances import class_chances
 
@@ -85,6 +86,17 @@ class Match(ReadOnly):
         they are first asked for, which takes 2 ms, and kept.
         """
         return freeze(pair_points(self.query, self.descriptor))
+
+    @cached_property
+    def mirrored(self) -> bool | None:
+        """Say whether the query is rather like the mirror image of this shape, as a left bone of a right one.
+
+        None if it cannot be told, since both sides are alike, as of an animal, since the shapes agree too
+        little, or since both were described by heat. It takes 50 ms when it is first asked for.
+        """
+        if isinstance(self.query, PatchDescriptor) and isinstance(self.descriptor, PatchDescriptor):
+            return self.query.is_mirror_image(self.descriptor)
+        return None
 
 
 @record

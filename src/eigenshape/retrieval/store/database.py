@@ -33,7 +33,7 @@ COLUMNS = np.dtype([(name, "<i8") for name in (*INTEGERS, "checksum")])
 # they come out in a microsecond a shape. AUTOINCREMENT: no number is used twice.
 INDEX = _sealed.Kind(
     "An index",
-    format=9,
+    format=10,
     tables={
         "recipe": """CREATE TABLE recipe (
     id INTEGER PRIMARY KEY, fields TEXT NOT NULL UNIQUE, n_columns INTEGER NOT NULL,
