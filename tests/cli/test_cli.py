@@ -337,7 +337,7 @@ def test_an_index_lists_files_that_it_holds_twice_and_names_the_methods_that_it_
     assert run_json("index", "duplicates", tmp_path / "db")["pairs"] == []
     run("index", "add", tmp_path / "db", folder, *options)  # named by another folder
     (pair,) = run_json("index", "duplicates", tmp_path / "db")["pairs"]
-    assert pair == {"shape": "fish/one", "other": "one", "score": 0.0}
+    assert pair == {"shape": "fish/one", "other": "one", "score": 0.0, "kind": "copy"}
 
     found = run("query", tmp_path / "db", folder / "one.ply", "--method", "scale-free")
     assert "score: 0 for the same description, lower is more alike" in found.stdout

@@ -183,6 +183,16 @@ def test_landmarks_of_a_specimen_that_fails_or_in_another_order_are_named(scans,
     assert float(row["disagreement"]) > 0.1
 
 
+def test_what_is_doubtful_on_all_specimens_is_said_once(scans, output, tmp_path):
+    exchanged = es.morphometrics.Landmarks(NAMES, landmarks(1).points[[1, 0, 2, 3]])
+    table = tmp_path / "table.csv"
+    es.morphometrics.write_landmarks({"hand 0": landmarks(0), "hand 1": exchanged}, table)
+    options = ("-o", output, "--landmarks", table, "--workers", 1)
+    lines = run("collection", scans, *options, code=3).stdout.splitlines()
+    about = [line for line in lines if "doubtful landmarks" in line]
+    assert about == [f"  all specimens: doubtful landmarks: {NAMES[0]}, {NAMES[1]}"]
+
+
 def test_a_unit_that_the_file_names_is_converted(scans, output, tmp_path):
     small = es.morphometrics.Landmarks(NAMES, landmarks(0).points / 1000)
     path = tmp_path / "hand 0.mrk.json"

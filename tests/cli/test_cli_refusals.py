@@ -129,3 +129,75 @@ def test_an_unknown_choice_is_wrong_usage_and_names_the_others(verb, choices):
     done = CliRunner().invoke(app, arguments, env={"COLUMNS": "200"})
     assert done.exit_code == 2
     assert f"'best' is not one of {choices}." in done.stderr
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("info", "{folder}"),
+        ("info", "{folder}", "--json"),
+        ("repair", "{folder}", "-o", "{out}.ply"),
+        ("decimate", "{folder}", "--ratio", "0.5", "-o", "{out}.ply"),
+        ("tetrahedralize", "{folder}", "-o", "{out}.vtu"),
+        ("spectrum", "{folder}", "--json"),
+        ("features", "{folder}"),
+        ("segment", "{folder}"),
+        ("label", "{file}", "--like", "{folder}"),
+        ("match", "{file}", "{folder}", "--json"),
+        ("transfer", "{folder}", "{file}", "-o", "{out}.glb"),
+        ("pose", "{file}", "--like", "{folder}", "-o", "{out}.ply"),
+        ("stability", "{folder}", "{file}"),
+        ("fuse", "{folder}", "-o", "{out}.ply"),
+        ("compress", "{folder}", "-o", "{out}.esz"),
+        ("report", "{folder}", "-o", "{out}.html"),
+    ],
+)
+def test_a_folder_in_place_of_a_file_names_a_file_in_it(fish, tmp_path, arguments):
+    (tmp_path / "notes.txt").write_text("not a shape\n")
+    places = {"folder": fish.parent, "file": fish, "out": tmp_path / "out"}
+    done = run(*(each.format(**places) for each in arguments), code=1)
+    assert done.stdout == ""
+    assert done.stderr == (
+        f"error: {fish.parent} must be a file; it is a folder. Name a file, such as {fish}.\n"
+    )
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("decompress", "{folder}", "-o", "{out}.ply"),
+        ("deform", "{file}", "--edits", "{folder}", "-o", "{out}.ply"),
+        ("stability", "{file}", "{file}", "--map", "{folder}"),
+        ("label", "{file}", "--like", "{file}", "--labels", "{folder}"),
+    ],
+)
+def test_a_folder_in_place_of_what_is_no_shape_is_named(fish, tmp_path, arguments):
+    places = {"folder": tmp_path, "file": fish, "out": tmp_path / "out"}
+    done = run(*(each.format(**places) for each in arguments), code=1)
+    assert done.stderr == f"error: {tmp_path} must be a file; it is a folder. Name a file.\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("label", "{fish}", "--library", "{fish}"), "Choose a folder instead of a file"),
+        (("demo", "-o", "{fish}"), "Choose a folder instead of a file"),
+        (("collection", "{folder}", "-o", "{fish}"), "Choose a folder instead of a file"),
+        (("collection", "{fish}", "-o", "{out}"), "there are 1. Name the folder in which they lie"),
+        (("spectrum", "{fish}", "-k", "3", "--cache", "{fish}"), "File exists. Choose another one"),
+        (("query", "{fish}", "{folder}"), "has no index.sqlite and is a file. Create one with"),
+        (("index", "ls", "{fish}", "--json"), "has no index.sqlite and is a file. Create one with"),
+        (("index", "add", "{fish}", "{fish}"), "File exists. Choose another folder"),
+        (("serve", "{fish}"), "has no index.sqlite and is a file. Create one with"),
+    ],
+)
+def test_a_file_in_place_of_a_folder_is_named(fish, tmp_path, arguments, message):
+    for name in ("one", "two"):
+        (tmp_path / f"{name}.off").write_bytes(fish.read_bytes())
+    places = {"fish": fish, "folder": tmp_path, "out": tmp_path / "out"}
+    before = fish.read_bytes()
+    done = CliRunner().invoke(app, [each.format(**places) for each in arguments])
+    assert done.exit_code in (1, 2)
+    assert message in done.stderr
+    assert str(fish) in done.stderr or "there are 1" in done.stderr
+    assert fish.read_bytes() == before

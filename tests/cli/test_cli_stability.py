@@ -23,6 +23,25 @@ def folder(tmp_path_factory):
     return place
 
 
+def test_another_unit_and_open_seams_are_named(folder, tmp_path):
+    torus = es.read_mesh(folder / "one.ply")
+    es.write_mesh(es.TriangleMesh(torus.vertices * 25.4, torus.faces), tmp_path / "in mm.ply")
+    rings = es.shapes.grid(12, 8)
+    angles = 2 * np.pi * rings.vertices[:, 0] / rings.vertices[:, 0].max()
+    tube = np.column_stack([np.cos(angles), np.sin(angles), rings.vertices[:, 1]])
+    es.write_mesh(es.TriangleMesh(tube, rings.faces), tmp_path / "tube.ply")
+
+    units = ("stability", folder / "one.ply", tmp_path / "in mm.ply", *FEW)
+    said = run(*units).stderr
+    assert "note: lengths of in mm.ply are 25.4 times as large" in said
+    normalized = run(*units, "--normalize", "area", "--json")
+    assert "times as large" not in normalized.stderr
+    assert max(json.loads(normalized.stdout)["spectra"]["relative"]) < 1e-6
+    said = run("stability", tmp_path / "tube.ply", folder / "one.ply", *FEW).stderr
+    assert "note: tube.ply is open along seams (8 sides)" in said
+    assert "one.ply" not in said
+
+
 @pytest.mark.long
 def test_people_see_tables_words_and_a_picture(folder, tmp_path):
     picture = tmp_path / "report.png"

@@ -15,6 +15,8 @@ def run(*arguments):
 
 @pytest.mark.parametrize("verb", ["studio", "serve", "report"])
 def test_without_the_studio_its_verbs_say_what_to_install(monkeypatch, tmp_path, verb):
+    for name in [name for name in sys.modules if name.startswith("eigenshape_studio.")]:
+        monkeypatch.delitem(sys.modules, name)  # of tests before this one
     monkeypatch.setitem(sys.modules, "eigenshape_studio", None)
     done = run(verb, "nowhere.ply", *(["-o", tmp_path / "a.html"] if verb == "report" else []))
     assert done.exit_code == 1

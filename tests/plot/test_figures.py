@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+import eigenshape as es
 from certeig.kit.errors import InvalidParameterError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.operators.cotangent import cotangent_laplacian
@@ -224,3 +225,50 @@ def test_limits_are_those_of_the_color_bar():
         figure_field(mesh, np.full(42, np.nan))
     with pytest.raises(InvalidParameterError, match="values must be finite"):
         figure_field(mesh, np.full(42, np.inf))
+
+
+def test_labels_of_vertices_are_named_with_what_draws_them():
+    mesh = es.icosphere(1)
+    labels = (mesh.vertices[:, 1] > 0).astype(int)
+    for draw_parts in (es.figure_segments, es.plot.part_colors, es.retrieval.LabeledShape):
+        with pytest.raises(
+            es.InvalidParameterError, match=r"the shape is \(42,\).*es.figure_field"
+        ):
+            draw_parts(mesh, labels)
+    es.figure_field(mesh, labels)  # what the message advises, both ways
+    assert es.figure_segments(mesh, labels[mesh.simplices[:, 0]]).axes[0].get_title() == "2 parts"
+    # Of the right place and the wrong type, the message says nothing of places.
+    with pytest.raises(es.InvalidParameterError, match=r"the type float64\.$"):
+        es.figure_segments(mesh, np.zeros(mesh.n_faces))
+
+
+def test_values_of_faces_are_named_with_what_draws_them():
+    mesh = es.icosphere(1)
+    left = es.TriangleMesh(mesh.vertices - [2, 0, 0], mesh.faces)
+    heights = mesh.vertices[mesh.faces].mean(axis=1)[:, 1]
+    advice = (
+        r"shape \(42,\); there is one for each of 80 faces\. .* es\.calculus\.average_onto_points"
+    )
+    for draw_field in (
+        lambda: es.figure_field(mesh, heights),
+        lambda: es.plot.figure_fields({"ball": (mesh, heights)}),
+        lambda: es.plot.figure_cortex({"left": left}, {"left": heights}),
+    ):
+        with pytest.raises(es.InvalidParameterError, match=advice):
+            draw_field()
+    es.figure_field(mesh, es.calculus.average_onto_points(mesh, heights))
+
+
+@pytest.mark.parametrize(
+    ("name", "n_due", "n_given"),
+    [("vertex_colors", 42, 80), ("face_colors", 80, 42), ("zero_set_of", 42, 80)],
+)
+def test_colors_of_the_wrong_place_are_not_drawn(name, n_due, n_given):
+    mesh = es.icosphere(1)
+    camera = es.plot.aim_camera(mesh, size=32)
+    values = np.zeros(n_given) if name == "zero_set_of" else np.zeros((n_given, 3))
+    fact = (
+        f"{name} must have {n_due} rows; there are {n_given}. Colors of vertices are vertex_colors"
+    )
+    with pytest.raises(es.InvalidParameterError, match=fact):
+        es.plot.draw(mesh, camera, **{name: values})

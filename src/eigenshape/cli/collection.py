@@ -139,7 +139,8 @@ def collection(
         for name, notes in built.notes.items():
             if notes:
                 out.print(f"  {escape_text(name)}: {escape_text('; '.join(notes))}")
-        for name, rows in doubtful.items():
+        rows_of = {} if carried is None else steps.doubtful_in_short(carried)
+        for name, rows in rows_of.items():
             first = ", ".join(rows[:MOST_NAMED]) + (", ..." if len(rows) > MOST_NAMED else "")
             out.print(f"  {escape_text(name)}: doubtful landmarks: {escape_text(first)}")
         print_failures(built.failures.items())

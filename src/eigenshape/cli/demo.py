@@ -63,7 +63,7 @@ def demo(
             if not path.exists():
                 path.parent.mkdir(parents=True, exist_ok=True)
                 es.write_mesh(es.make_creature(name, pose, n_vertices=N_VERTICES), path)
-    out.print(f"describing and indexing them, which takes most of a minute: {escape_text(index)}")
+    out.print(f"describing and indexing them, which takes some ten seconds: {escape_text(index)}")
     add(index, [creatures], workers=workers)
 
     out.print(

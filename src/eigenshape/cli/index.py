@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, cast
 
 import typer
 
@@ -30,6 +30,9 @@ Sides = Annotated[int | None, typer.Option(min=0, max=50)]
 
 KILOBYTE = 1000  # bytes
 DAMAGED = 1  # exit code of `verify`
+# Score of copies at most: of 19 shapes, moved and scaled in single precision, it is up to 0.009, and of
+# poses of animals, 0.01 and more.
+COPY = 0.01
 MOST_NAMED = 5  # shapes that a message names
 
 
@@ -304,20 +307,34 @@ def duplicates(
     Parameters
     ----------
     score
-        Largest score of two shapes that count as nearly the same. Copies have a score near 0,
-        also if they are moved or scaled, and other poses often less than 0.1.
+        Largest score of two shapes that count as nearly the same. Below 0.01 they are a copy: the
+        same shape, also moved or scaled, or a mirror image. From there on they are similar: another
+        pose, noise, or a copy with other vertices.
     """
     opened = es.ShapeIndex.open(index)
     with progress_bar("duplicates") as progress:
-        pairs = es.retrieval.find_duplicates(opened, most_score=score, progress=progress)
+        found = es.retrieval.find_duplicates(opened, most_score=score, progress=progress)
+    pairs = [(*pair, _kind_of_pair(opened, *pair)) for pair in found]
+    columns = ["shape", "other", "score", "kind"]
     if as_json:
-        rows = [{"shape": one, "other": two, "score": number} for one, two, number in pairs]
+        rows = [dict(zip(columns, pair, strict=True)) for pair in pairs]
         print_json({"index": index, "shapes": len(opened), "pairs": rows})
     elif pairs:
-        texts = [[one, two, f"{number:.3f}"] for one, two, number in pairs]
-        print_table("Nearly the same", ["shape", "other", "score"], texts)
+        texts = [[one, two, f"{number:.3f}", kind] for one, two, number, kind in pairs]
+        print_table("Nearly the same", columns, texts)
     else:
         out.print(f"none of {count_shapes(len(opened))} is nearly the same as another")
+
+
+def _kind_of_pair(index: es.ShapeIndex, one: str, other: str, score: float) -> str:
+    """Return what two shapes that are nearly the same are to each other."""
+    if score >= COPY:
+        return "similar"
+    recipe = index.default_recipe()
+    if isinstance(recipe, es.retrieval.PatchRecipe):
+        first, second = (cast(Any, index.descriptors(name, recipe)[0]) for name in (one, other))
+        return "mirror image" if first.is_mirror_image(second) else "copy"
+    return "copy"
 
 
 def learn(

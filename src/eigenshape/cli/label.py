@@ -8,7 +8,7 @@ import typer
 
 import eigenshape as es
 from eigenshape.cli import steps
-from eigenshape.cli.console import SOME_FAILED, print_json, progress_bar
+from eigenshape.cli.console import SOME_FAILED, escape_text, out, print_json, progress_bar
 
 COLUMNS = {
     "part": "part",
@@ -81,6 +81,7 @@ def label(
             {
                 "path": mesh,
                 "like": dict(zip(examples, found.weights.tolist(), strict=True)),
+                "mirrored": dict(zip(examples, found.mirrored, strict=True)),
                 "left_out": left_out,
                 "parts": rows,
                 "face_labels": found.labels,
@@ -90,6 +91,9 @@ def label(
     else:
         columns = {key: value for key, value in COLUMNS.items() if names or key != "name"}
         steps.print_rows("Labels", columns, rows)
+        images = [name for name, is_image in zip(examples, found.mirrored, strict=True) if is_image]
+        if images:
+            out.print(escape_text(f"mirror images of this shape: {', '.join(images)}"))
     if output:
         # A label has the same color whichever labels of the examples occur on the mesh.
         every = sorted({each for shape in examples.values() for each in shape.labels.tolist()})

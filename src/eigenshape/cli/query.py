@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from os.path import isdir, isfile
 from pathlib import Path
 from time import perf_counter
@@ -40,19 +41,20 @@ COLUMNS = (
     "source",
     "score",
     "chance",
+    "mirrored",
     "corresponding points",
 )
 
 
 @dataclass(frozen=True)
 class _Answer:
-    """What was found for one query; a shape of the index is not drawn, so it has no colors."""
+    """What was found for one query; a shape of the index is not drawn, so it has no mesh."""
 
     title: str
     descriptor: Any
     matches: es.retrieval.Matches
     seconds: dict[str, float]
-    colored: steps.ColoredQuery | None = None
+    mesh: es.TriangleMesh | None = None
 
 
 def query(
@@ -158,11 +160,11 @@ def _ask(
 ) -> _Answer:
     """Describe a scan, and search for it."""
     began = perf_counter()
-    colored = steps.color_query(mesh, recipe)
+    descriptor = es.describe(mesh, recipe)
     described = perf_counter()
-    matches = reader.query(colored.descriptor, **options)
+    matches = reader.query(descriptor, **options)
     seconds = {"describe": described - began, "query": perf_counter() - described}
-    return _Answer(title, colored.descriptor, matches, seconds, colored)
+    return _Answer(title, descriptor, matches, seconds, mesh)
 
 
 def _ask_stored(
@@ -195,7 +197,14 @@ def _write(answers: Sequence[_Answer], output: Path) -> None:
         table.writerow(COLUMNS)
         for answer in answers:
             for rank, match in enumerate(answer.matches, start=1):
-                facts = (match.name, match.label, match.source, match.score, match.chance)
+                facts = (
+                    match.name,
+                    match.label,
+                    match.source,
+                    match.score,
+                    match.chance,
+                    match.mirrored,
+                )
                 table.writerow((answer.title, rank, *facts, len(match.correspondences)))
     print_written(output)
 
@@ -231,7 +240,8 @@ def _print(answers: Sequence[_Answer], *, classify: bool) -> None:
             for match in answer.matches:
                 chance = "" if match.chance is None else f"{100 * match.chance:.2g} %"
                 n_points = str(len(match.correspondences))
-                rows.append([match.name, match.label or "", f"{match.score:.3f}", chance, n_points])
+                name = f"{match.name} (mirror image)" if match.mirrored else match.name
+                rows.append([name, match.label or "", f"{match.score:.3f}", chance, n_points])
             print_table(title, ["shape", "label", "score", "chance", "corresponding points"], rows)
         else:
             out.print(
@@ -253,9 +263,10 @@ def _print(answers: Sequence[_Answer], *, classify: bool) -> None:
         )
     # One time for both: the first scan of a process waits for modules to be loaded, in either.
     seconds = sum(sum(answer.seconds.values()) for answer in answers)
-    n_compared = sum(answer.matches.n_compared for answer in answers)
+    n_compared = max(answer.matches.n_compared for answer in answers)
+    each = "" if len(answers) == 1 else f"{len(answers)} scans, each "
     out.print(
-        f"described, and compared with {count_shapes(n_compared)}, in {seconds:.1f} s "
+        f"{each}described, and compared with {count_shapes(n_compared)}, in {seconds:.1f} s "
         f"({answers[0].matches.method})"
     )
 
@@ -268,20 +279,23 @@ def _draw(
     picture: Path | None,
     explain: Path | None,
 ) -> None:
-    if answer.colored is None or not answer.matches:
+    if answer.mesh is None or not answer.matches:
         err.print("there is no match to draw")
         return
-    title = literal(Path(answer.title).stem)
+    draw = partial(
+        es.plot.figure_matches,
+        answer.mesh,
+        repair=repairs,
+        title=f"query: {literal(Path(answer.title).stem)}",
+        **side,
+    )
     if picture:
         caption = (
             f"{literal(answer.title)} and the {len(answer.matches)} most similar shapes in "
-            f"{literal(index.name)}\n{steps.CAPTION}"
+            f"{literal(index.name)}"
         )
-        sheet = steps.contact_sheet(
-            answer.colored, title, answer.matches, repairs=repairs, caption=caption, side=side
-        )
-        steps.save_picture(sheet, picture)
+        with progress_bar("draw") as progress:
+            figure = draw(answer.matches, caption=caption, progress=progress)
+        steps.save_picture(figure, picture)
     if explain:
-        best = answer.matches[0]
-        figure = steps.explanation(answer.colored, title, best, repairs=repairs, side=side)
-        steps.save_picture(figure, explain)
+        steps.save_picture(draw(answer.matches[0]), explain)

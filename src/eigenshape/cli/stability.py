@@ -9,11 +9,20 @@ import eigenshape as es
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.text import literal
 from eigenshape.cli import steps
-from eigenshape.cli.console import out, print_json, print_table, progress_bar, result_facts
+from eigenshape.cli.console import (
+    err,
+    escape_text,
+    out,
+    print_json,
+    print_table,
+    progress_bar,
+    result_facts,
+)
 from eigenshape.stability.plan import StabilityPlan
 
 Normalization = Literal["none", "area", "diameter"]
 USUAL = StabilityPlan()
+OTHER_UNIT = 2.0  # ratio of lengths from which two units are likely; inch and cm differ by 2.54
 
 
 def stability(
@@ -69,6 +78,7 @@ def stability(
     shapes: list[Any] = []
     for path in (one, two):
         shape: Any = steps.load_shape(path, repair, dim)
+        steps.note_seams(shape, path.name)
         if normalize != "none":
             if not isinstance(shape, es.TriangleMesh):
                 raise InvalidParameterError(
@@ -77,6 +87,13 @@ def stability(
             shape = es.geometry.normalize_mesh(shape, normalize)
         shapes.append(shape)
     first, second = shapes
+    if all(isinstance(shape, es.TriangleMesh) for shape in shapes):
+        factor = (es.geometry.surface_area(second) / es.geometry.surface_area(first)) ** 0.5
+        if not 1 / OTHER_UNIT < factor < OTHER_UNIT:
+            err.print(
+                f"[yellow]note:[/] lengths of {escape_text(two.name)} are {factor:.4g} times as large "
+                "(root of the ratio of areas); if only the unit differs, add --normalize area"
+            )
     plan = StabilityPlan(
         k=k, n_samples=n_samples, times=tuple(t or ()), seed=seed, brackets=brackets
     )

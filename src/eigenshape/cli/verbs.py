@@ -69,6 +69,8 @@ class Verb(TyperCommand):
             text = str(error)
             if isinstance(error, OSError) and error.filename is not None:
                 text = f"{error.filename}: {error.strerror}"  # without the number of the error
+                if isinstance(error, FileExistsError | NotADirectoryError):
+                    text += ". Choose a folder instead of a file, or another name for it"
             err.print(f"[bold red]error:[/] {escape_text(text)}")
             raise typer.Exit(2 if isinstance(error, InvalidParameterError) else 1) from error
         except KeyboardInterrupt as error:

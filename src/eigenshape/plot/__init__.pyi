@@ -8,6 +8,7 @@ from .fields import figure_segments as figure_segments
 from .fields import part_colors as part_colors
 from .fields import value_colors as value_colors
 from .figure import save_figure as save_figure
+from .matches import figure_matches as figure_matches
 from .ordination import figure_landmarks as figure_landmarks
 from .ordination import figure_ordination as figure_ordination
 from .persistence import figure_diagram as figure_diagram

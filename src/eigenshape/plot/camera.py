@@ -8,11 +8,11 @@ from scipy.spatial import ConvexHull, QhullError
 from typing_extensions import TypeAliasType
 
 from certeig.kit.arguments import require_type
-from certeig.kit.arrays import ReadOnly, real_numbers, record, whole_number
+from certeig.kit.arrays import TINY, ReadOnly, real_numbers, record, whole_number
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike
-from eigenshape._vectors import area_vectors, scale_to_unit, triangle_areas
+from eigenshape._vectors import area_vectors, row_dots, scale_to_unit, triangle_areas
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table
@@ -172,7 +172,7 @@ def upward_direction(mesh: TriangleMesh, up: Up) -> Float[np.ndarray, "3"]:
     if isinstance(up, str) and up == "auto":
         points = scale_to_unit(mesh.vertices)[0]
         areas = triangle_areas(points[mesh.faces])
-        weights = areas / max(areas.sum(), np.finfo(np.float64).tiny)
+        weights = areas / max(areas.sum(), TINY)
         points = points - weights @ points[mesh.faces].mean(axis=1)
         stands, sizes = [], []
         for axis in (1, 2):
@@ -237,8 +237,8 @@ def _guess_front(
     # An open surface that mostly faces one way is a scan, and its front is where the scanner stood.
     points = scale_to_unit(mesh.vertices)[0]
     vectors = area_vectors(points[mesh.faces])
-    areas, tiny = np.linalg.norm(vectors, axis=1), np.finfo(np.float64).tiny
-    facing = vectors.sum(axis=0) / max(areas.sum(), tiny)
+    areas = np.linalg.norm(vectors, axis=1)
+    facing = vectors.sum(axis=0) / max(areas.sum(), TINY)
     is_scan = np.linalg.norm(facing) > ONE_WAY
     if is_scan and np.linalg.norm(np.cross(upward, facing)) > 0.1:
         level = facing - (facing @ upward) * upward
@@ -254,13 +254,13 @@ def _guess_front(
         np.array(VIEWS["front-left"]) @ [side * front, side * left, upward] for side in (1, -1)
     )
     # The bending of an edge is its angle times its length, weighted by how far it faces the viewer.
-    normals = vectors / np.maximum(areas, tiny)[:, None]
+    normals = vectors / np.maximum(areas, TINY)[:, None]
     if np.einsum("ij,ij->", vectors, points[mesh.faces].mean(axis=1)) < 0:
         normals = -normals  # the faces look inward
     table = edge_table(mesh)
     pairs, edges = table.face_pairs
     one, two = normals[pairs].transpose(1, 0, 2)
-    angles = np.arccos(np.clip(np.einsum("ij,ij->i", one, two), -1, 1))
+    angles = np.arccos(np.clip(row_dots(one, two), -1, 1))
     begin, end = points[table.edges[edges]].transpose(1, 0, 2)
     bending = angles * np.linalg.norm(end - begin, axis=1)
     viewers = np.stack([towards, behind])
@@ -272,6 +272,6 @@ def in_picture(mesh: TriangleMesh, camera: Camera) -> Float[np.ndarray, "n 3"]:
     """Return the vertices in pixels: right, down, and towards the viewer; the shape fills the picture."""
     points = scale_to_unit(mesh.vertices)[0] @ camera.rotation.T
     low, high = points.min(axis=0), points.max(axis=0)
-    span = max(float((high - low)[:2].max()), np.finfo(np.float64).tiny)
+    span = max(float((high - low)[:2].max()), TINY)
     scale = camera.size * (1 - 2 * FREE_BORDER) / span
     return (points - (low + high) / 2) * scale + [camera.size / 2, camera.size / 2, 0.0]

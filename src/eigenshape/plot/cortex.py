@@ -112,9 +112,9 @@ def figure_cortex(
     bar = None
     shades = {side: _parcel_colors(each, meshes[side]) for side, each in parcels.items()}
     if maps:
-        fields = {side: vertex_field(each, meshes[side].n_vertices) for side, each in maps.items()}
+        fields = {side: vertex_field(each, meshes[side]) for side, each in maps.items()}
         numbers = np.concatenate([field.filled(np.nan) for field in fields.values()])
-        together = vertex_field(numbers, len(numbers))
+        together = np.ma.masked_invalid(numbers)
         scale, extend = value_scale(together, limits)
         colors = mpl.colormaps[color_map].with_extremes(bad=NO_VALUE)
         shades = {side: map_colors(field, scale, colors) for side, field in fields.items()}

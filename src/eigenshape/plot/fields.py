@@ -18,6 +18,7 @@ from eigenshape._arrays import face_labels, vertex_values
 from eigenshape._errors import count_nouns
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_areas
+from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.plot.camera import Camera, Up, View, choose_camera
 from eigenshape.plot.figure import Figure
 from eigenshape.plot.render import Drawing, draw, palette
@@ -169,7 +170,7 @@ def figure_field(  # noqa: PLR0913 - what is drawn, and one keyword for each cho
     mesh = as_mesh(mesh)
     figure = Figure(figsize=(2 * PANEL + 1.2, 2 * PANEL), layout="constrained")
     axes = figure.subplots()
-    field = vertex_field(values, mesh.n_vertices)
+    field = vertex_field(values, mesh)
     scale, extend = value_scale(field, limits)
     colors = mpl.colormaps[color_map].with_extremes(bad=NO_VALUE)
     camera = choose_camera(mesh, camera, view, up)
@@ -242,8 +243,8 @@ def figure_fields(  # noqa: PLR0913 - what is drawn, and one keyword for each ch
                 f"fields must hold pairs (mesh, values); {title!r} has a {type(pair).__name__}."
             )
         mesh = as_mesh(pair[0], title)
-        shapes[title] = (mesh, vertex_field(pair[1], mesh.n_vertices))
-    everything = np.ma.concatenate([field for _, field in shapes.values()])  # type: ignore[no-untyped-call]
+        shapes[title] = (mesh, vertex_field(pair[1], mesh))
+    everything = np.ma.concatenate([field for _, field in shapes.values()])
     scale, extend = value_scale(everything, limits)
     colors = mpl.colormaps[color_map].with_extremes(bad=NO_VALUE)
     n_columns = 2 if len(shapes) == 4 else min(len(shapes), 3)
@@ -267,14 +268,20 @@ def _empty_grid(n_drawings: int, n_columns: int) -> tuple[Figure, np.ndarray]:
     return figure, grid
 
 
-def vertex_field(values: ArrayLike, n_vertices: int) -> np.ma.MaskedArray:
+def vertex_field(values: ArrayLike, mesh: TriangleMesh) -> np.ma.MaskedArray:
     """Return one number per vertex, masked where it is NaN.
 
     Raise InvalidParameterError if there is another number of values, or one is infinite.
     """
     field = real_numbers(values, "values").astype(np.float64)
+    if field.shape == (mesh.n_faces,) != (mesh.n_vertices,):
+        raise InvalidParameterError(
+            f"values must hold one number per vertex, shape ({mesh.n_vertices},); there is one for each "
+            f"of {mesh.n_faces} faces. es.figure_segments draws labels of faces; values of faces become "
+            "those of vertices by es.calculus.average_onto_points."
+        )
     missing = np.isnan(field)
-    vertex_values(np.where(missing, 0.0, field), "values", n_vertices)
+    vertex_values(np.where(missing, 0.0, field), "values", mesh.n_vertices)
     return np.ma.masked_array(field, missing)
 
 
@@ -364,7 +371,7 @@ def figure_segments(
     '2 parts around their feature points (hollow: on the far side)'
     """
     mesh = as_mesh(mesh)
-    labels = face_labels(labels, "labels", mesh.n_faces)
+    labels = face_labels(labels, "labels", mesh)
     marked = np.empty(0, dtype=np.int64)
     if vertices is not None:
         marked = whole_numbers(vertices, "A feature point", 0, mesh.n_vertices - 1)
@@ -418,12 +425,12 @@ def part_colors(mesh: MeshLike, labels: ArrayLike) -> UInt8[np.ndarray, "n 3"]:
     ((42, 3), 2)
     """
     mesh = as_mesh(mesh)
-    labels = face_labels(labels, "labels", mesh.n_faces).astype(np.int64)
+    labels = face_labels(labels, "labels", mesh).astype(np.int64)
     corners, areas = mesh.faces.ravel(), np.repeat(face_areas(mesh), 3)
     shape = (mesh.n_vertices, int(labels.max(initial=-1)) + 2)
-    around = sp.coo_array(
+    around = sp.csr_array(
         (areas / (areas.max() or 1.0), (corners, np.repeat(labels, 3) + 1)), shape=shape
-    ).tocsr()
+    )
     return _bytes(palette(np.asarray(around.argmax(axis=1)).ravel() - 1))
 
 

@@ -5,7 +5,7 @@ from jaxtyping import Int
 from matplotlib.colors import to_hex
 
 from certeig.kit.arguments import require_type
-from certeig.kit.arrays import number_from_zero, whole_number
+from certeig.kit.arrays import TINY, number_from_zero, whole_number
 from eigenshape.features.diagram import PersistenceDiagram, PersistencePairs
 from eigenshape.features.region_tree import MergeTree, PartTree
 from eigenshape.features.segmentation import merge_targets
@@ -63,7 +63,7 @@ def figure_diagram(diagram: PersistenceDiagram, *, label: str = "function") -> F
         points.set(edgecolor="white", linewidth=0.4, label=f"{text} ({len(pairs.births):,})")
     # The range of the function, widened: no pair leaves that of its component.
     low, high = float(diagram.components.births.min()), float(diagram.components.deaths.max())
-    margin = 0.05 * (high - low) or 0.5 * max(abs(high), np.finfo(np.float64).tiny)
+    margin = 0.05 * (high - low) or 0.5 * max(abs(high), TINY)
     low, high = low - margin, high + margin
     axes.plot([low, high], [low, high], color=GUIDE, lw=1, zorder=1)
     axes.set(xlim=(low, high), ylim=(low, high), aspect="equal")

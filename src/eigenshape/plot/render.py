@@ -6,7 +6,9 @@ from jaxtyping import Bool, Float, Int
 
 from certeig.kit.arguments import require_type
 from certeig.kit.arrays import ReadOnly, record
+from certeig.kit.errors import InvalidParameterError
 from certeig.kit.threads import one_blas_thread
+from eigenshape._vectors import unit_vectors
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.creases import corner_normals
 from eigenshape.geometry.face_turns import orient_consistently
@@ -85,6 +87,11 @@ def draw(
     Drawing
         Boundary edges are drawn dark as well.
 
+    Raises
+    ------
+    InvalidParameterError
+        If colors or the function do not have a row for each vertex, or for each face.
+
     See Also
     --------
     figure_field : Draw a function on a mesh, with its legend.
@@ -98,25 +105,39 @@ def draw(
     """
     mesh = as_mesh(mesh)
     require_type(camera, Camera, "camera")
+    of_vertices = {"vertex_colors": vertex_colors, "zero_set_of": zero_set_of}
+    for name, values in {**of_vertices, "face_colors": face_colors}.items():
+        n_rows = len(mesh.vertices if name in of_vertices else mesh.faces)
+        if values is not None and len(values) != n_rows:
+            raise InvalidParameterError(
+                f"{name} must have {n_rows} rows; there are {len(values)}. Colors of vertices are "
+                "vertex_colors, those of faces face_colors, and es.figure_field draws a function."
+            )
     fine = Camera(camera.rotation, camera.size * FINER)
     points = in_picture(mesh, fine)
     raster = Raster.of(points, mesh.faces, fine.size, fine.size)
+    # Colors and light are computed where the shape is seen, mostly a small part of the picture.
     seen = raster.face >= 0
+    face, weights = raster.face[seen], raster.weights[seen]
 
-    def blend(at_corners: Float[np.ndarray, "f 3 c"]) -> Float[np.ndarray, "h w c"]:
-        return np.einsum("hwk,hwkc->hwc", raster.weights, at_corners[raster.face])
+    def blend(at_corners: Float[np.ndarray, "f 3 c"]) -> Float[np.ndarray, "p c"]:
+        return np.einsum("pk,pkc->pc", weights, at_corners[face])
 
-    colors = np.full((*raster.face.shape, 3), 0.78)
+    def place(values: Float[np.ndarray, "p c"]) -> Float[np.ndarray, "h w c"]:
+        placed = np.zeros((*seen.shape, values.shape[1]))
+        placed[seen] = values
+        return placed
+
+    colors = np.full((len(face), 3), 0.78)
     if vertex_colors is not None:
         colors = blend(vertex_colors[mesh.faces])
     if face_colors is not None:
-        colors = face_colors[raster.face]
-    normals = blend(corner_normals(orient_consistently(mesh)) @ fine.rotation.T)
-    normals = normals / np.maximum(np.linalg.norm(normals, axis=2, keepdims=True), 1e-12)
+        colors = face_colors[face]
+    normals = unit_vectors(blend(corner_normals(orient_consistently(mesh)) @ fine.rotation.T))
     # Both sides of an open surface are lit.
-    normals = np.where(normals[..., 2:] < 0, -normals, normals)
+    normals = np.where(normals[:, 2:] < 0, -normals, normals)
     light = np.clip(normals @ (LIGHT / np.linalg.norm(LIGHT)), 0, 1)
-    shaded = colors * (AMBIENT + (1.08 - AMBIENT) * light)[..., None]
+    shaded = place(colors * (AMBIENT + (1.08 - AMBIENT) * light)[:, None])
 
     # Lines: boundary edges that nothing hides, changes of color, and the zero set
     ink = np.zeros(raster.face.shape, dtype=bool)
@@ -128,9 +149,9 @@ def draw(
         column, row, shown = _locate(along, raster)
         ink[row[shown], column[shown]] = True
     if face_colors is not None:
-        ink |= _changes(colors.sum(axis=2), raster)
+        ink |= _changes(place(colors.sum(axis=1, keepdims=True))[..., 0], raster)
     if zero_set_of is not None:
-        ink |= _changes(np.sign(blend(zero_set_of[mesh.faces, None])[..., 0]), raster)
+        ink |= _changes(np.sign(place(blend(zero_set_of[mesh.faces, None])))[..., 0], raster)
     radius = int(np.ceil(LINE * FINER / 2 - 0.5))
     thick = ink.copy()
     for down in range(-radius, radius + 1):

@@ -9,6 +9,7 @@ from matplotlib.colors import Normalize
 from matplotlib.ticker import MaxNLocator, NullFormatter
 
 from certeig.kit.arguments import require_type
+from certeig.kit.arrays import TINY
 from certeig.kit.errors import InvalidParameterError
 from eigenshape._vectors import nearest_rotations, scale_to_unit
 from eigenshape.geometry.conversion import MeshLike, ShapeLike, as_mesh, as_shape
@@ -114,7 +115,7 @@ def _rotation_of_map(
 def place_colors(points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
     """Return red, green and blue by the three coordinates, each from its lowest to its highest."""
     low, high = points.min(axis=0), points.max(axis=0)
-    shares = (points - low) / np.maximum(high - low, np.finfo(float).tiny)
+    shares = (points - low) / np.maximum(high - low, TINY)
     return DARKEST + (1 - DARKEST) * shares
 
 

@@ -1,3 +1,4 @@
+from .collecting import doubtful_in_short as doubtful_in_short
 from .collecting import doubtful_landmarks as doubtful_landmarks
 from .collecting import find_landmarks as find_landmarks
 from .collecting import mostly_doubtful as mostly_doubtful
@@ -33,11 +34,6 @@ from .reading import shape_facts as shape_facts
 from .recipes import PRESETS as PRESETS
 from .recipes import index_recipe as index_recipe
 from .recipes import query_recipe as query_recipe
-from .sheets import CAPTION as CAPTION
-from .sheets import ColoredQuery as ColoredQuery
-from .sheets import color_query as color_query
-from .sheets import contact_sheet as contact_sheet
-from .sheets import explanation as explanation
 from .writing import Side as Side
 from .writing import picture_side as picture_side
 from .writing import require_mesh_path as require_mesh_path
@@ -45,5 +41,4 @@ from .writing import require_output as require_output
 from .writing import save_heat as save_heat
 from .writing import save_labels as save_labels
 from .writing import save_like as save_like
-from .writing import save_match as save_match
 from .writing import save_picture as save_picture

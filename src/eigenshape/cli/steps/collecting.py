@@ -1,5 +1,7 @@
 """Landmarks beside the specimens of a collection: which are given, and where a person should look."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from eigenshape.collections.carrying import CarriedLandmarks
@@ -51,3 +53,11 @@ def doubtful_landmarks(carried: CarriedLandmarks) -> dict[str, list[str]]:
     names = np.array(carried.names)
     pairs = zip(carried.specimens, carried.doubtful, strict=True)
     return {specimen: names[row].tolist() for specimen, row in pairs if row.any()}
+
+
+def doubtful_in_short(carried: CarriedLandmarks) -> dict[str, list[str]]:
+    """Return `doubtful_landmarks`, with what is doubtful on all specimens only once, under a name for all."""
+    everywhere = carried.doubtful.all(axis=0)
+    of_all = np.array(carried.names)[everywhere].tolist()
+    rest = doubtful_landmarks(replace(carried, doubtful=carried.doubtful & ~everywhere))
+    return {"all specimens": of_all, **rest} if of_all else rest

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from certeig.kit.errors import CerteigError, InvalidParameterError
 from eigenshape.cli.console import err, escape_text, print_repairs
@@ -63,12 +62,12 @@ def load_shape(
     return done.cloud if isinstance(done, RepairedCloud) else done.mesh
 
 
-def note_seams(shape: Shape) -> None:
+def note_seams(shape: Shape, name: str = "this shape") -> None:
     """Print on stderr that a mesh is open along seams."""
     n_seams = 0 if isinstance(shape, PointCloud) else len(seams(shape))
     if n_seams:
         err.print(
-            f"[yellow]note:[/] this shape is open along seams ({n_seams} sides), which no heat "
+            f"[yellow]note:[/] {escape_text(name)} is open along seams ({n_seams} sides), which no heat "
             "crosses; --repair weld_seams closes them"
         )
 
@@ -130,13 +129,7 @@ def read_examples(
 
 
 def _read_example(path: Path, labels: Path | None, names: tuple[str, ...]) -> LabeledShape:
-    """Read a labeled shape and repair it; faces keep their labels."""
-    given = read_labeled_shape(path, labels)
-    done = repair(given.mesh, names)
-    if not done.report:
-        return given
-    print_repairs(tuple(f"{path.name}: {line}" for line in done.report))
-    # Repairs remove and split faces: each takes the label of the nearest one before.
-    middles = [mesh.vertices[mesh.faces].mean(axis=1) for mesh in (given.mesh, done.mesh)]
-    nearest = cKDTree(middles[0]).query(middles[1])[1]
-    return LabeledShape(done.mesh, given.labels[nearest])
+    """Read a labeled shape, and print on stderr what was repaired."""
+    found = read_labeled_shape(path, labels, repair=names)
+    print_repairs(tuple(f"{path.name}: {line}" for line in found.report))
+    return found

@@ -1,7 +1,6 @@
 """The files that verbs write: checks of their paths before any work is done, and writing them."""
 
 from collections.abc import Sequence
-from io import BytesIO
 from pathlib import Path
 from typing import TypedDict
 
@@ -9,8 +8,8 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 from matplotlib.figure import Figure
 
+from certeig.kit.arrays import TINY
 from certeig.kit.errors import FileFormatError, InvalidParameterError
-from certeig.kit.files import replace_file
 from eigenshape.cli.console import err, escape_text, print_written
 from eigenshape.cli.inputs import numbers_of
 from eigenshape.geometry.mesh import TriangleMesh
@@ -26,13 +25,11 @@ from eigenshape.io.formats.registry import (
 )
 from eigenshape.io.label_files import write_labels
 from eigenshape.io.mesh_files import read_mesh, save_mesh, write_mesh
-from eigenshape.matching.shape_match import ShapeMatch
 from eigenshape.plot.camera import UP_NAMES, VIEWS, Up, View
 from eigenshape.plot.fields import value_colors
 from eigenshape.plot.figure import require_picture_path, save_figure
 
 LABEL_LISTS = (".seg", ".txt")  # files with one label a line
-MAP_COLUMNS = "vertex,whole_vertex,face,weight_1,weight_2,weight_3,confidence"
 
 
 class Side(TypedDict):
@@ -158,25 +155,7 @@ def save_picture(figure: Figure, path: Path) -> None:
     print_written(path)
 
 
-def save_match(match: ShapeMatch, path: Path) -> None:
-    """Write a map as a table, as arrays, or as one vertex a line, and print so on stderr."""
-    file = BytesIO()
-    if path.suffix.lower() == ".txt":
-        np.savetxt(file, match.vertices, fmt="%d")
-    elif path.suffix.lower() == ".csv":
-        number = np.arange(match.n_vertices)
-        columns = (number, match.vertices, match.faces, match.weights, match.confidence)
-        formats = "%d,%d,%d,%.6g,%.6g,%.6g,%.4g"
-        np.savetxt(file, np.column_stack(columns), formats, header=MAP_COLUMNS, comments="")
-    else:
-        arrays = ("vertices", "faces", "corners", "weights", "confidence")
-        np.savez_compressed(file, **{name: getattr(match, name) for name in arrays})
-    replace_file(path, file.getvalue())
-    print_written(path)
-
-
 def save_heat(mesh: TriangleMesh, heat: Float[np.ndarray, " n"], path: Path) -> None:
     """Write a mesh, colored by the logarithm of its heat, and print so on stderr."""
-    smallest = np.finfo(np.float64).tiny
-    write_mesh(mesh, path, colors=value_colors(np.log(np.maximum(heat, smallest))))
+    write_mesh(mesh, path, colors=value_colors(np.log(np.maximum(heat, TINY))))
     print_written(path)
