@@ -65,6 +65,9 @@ class EIGENSHAPE_OT_match(Operation, bpy.types.Operator):  # noqa: N801
             outfit = es.matching.transfer(texture, part.mesh, match=match)
             part.write_texture(whole.data.uv_layers.active.name, outfit.attributes)
         sure = match.sure().mean()
+        # A part may be small; a map that fails says that the unit is not the one that was fixed
+        ratio = None if scale == "known" and sure < 0.5 else match.scale
+        self.note_unit(whole.owner, part.owner, ratio)
         self.report({"INFO"}, f"{sure:.0%} of the vertices are right with a probability of 0.5")
         for line in match.report:
             self.report({"INFO"}, line)

@@ -1,5 +1,6 @@
 """Operators that compute in a thread, show progress, and end when Esc is pressed."""
 
+import re
 import warnings
 from collections.abc import Callable, Generator
 from concurrent.futures import Future, wait
@@ -14,6 +15,21 @@ import eigenshape as es
 from .surface import Surface, read_surface
 
 SECONDS = 0.1  # between two looks at a thread
+# Ratio of lengths from which two units are likely: those of cm and mm are 10, of inch and mm 25.4
+OTHER_UNIT = 8
+# What messages advise in Python and on the command line, and what it is in Blender; the repair
+# "auto" welds seams and orients faces, but drops no piece
+ADVICE = {
+    r'Try repair\(\w+, \["(auto|weld|weld_seams|orient)"\]\).*': "Here: tick Repair.",
+    r'Try repair\(\w+, \["auto", "largest_component"\]\).*': (
+        "Here: tick Repair, or keep one piece of those that Mesh > Separate > By Loose Parts makes."
+    ),
+    r"Create one with ShapeIndex\.create.*": (
+        "Choose another folder, or press Add to Index: it makes one there."
+    ),
+    r'pass scale="unknown" \(.*\)': "set Scale to Unknown",
+    r"add it with replace=True \(.*\)": "tick Replace",
+}
 Compute = Callable[[es.types.Progress], Any]
 # The steps of an operator. It yields what may run in a thread, and is resumed with the result; it
 # yields None for the next event of mouse or keyboard. In between it reads and writes Blender's
@@ -106,6 +122,18 @@ class Operation:
             self.report({"INFO"}, line)
         return surface
 
+    def note_unit(
+        self, one: bpy.types.Object, other: bpy.types.Object, ratio: float | None = None
+    ) -> None:
+        """Warn if the ratio of lengths of two objects, that of their sizes, is one of two units."""
+        ratio = ratio or max(one.dimensions) / max(other.dimensions)
+        if not 1 / OTHER_UNIT < ratio < OTHER_UNIT:
+            self.report(
+                {"WARNING"},
+                f"{one.name} is {ratio:.3g} times as large as {other.name}: perhaps its unit of "
+                "length is another one. If so, scale it with S, from cm to m by 0.01",
+            )
+
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Run all steps, one after the other."""
         self.by_hand = False  # of an instance that was called by hand before
@@ -155,15 +183,14 @@ class Operation:
         try:
             result = event if job is None else job.result()
             for note in job.notes if job else ():
-                self.report({"WARNING"}, note)
+                self.report({"WARNING"}, advise_here(note))
             compute = self._steps.send(result)
         except StopIteration:
             return {"FINISHED"}
         except CancelledError:
             return {"CANCELLED"}
         except (es.EigenshapeError, OSError) as error:
-            remedy = "" if self.repair or "repair(" not in str(error) else " Here: tick Repair."
-            self.report({"ERROR"}, f"{error}{remedy}")
+            self.report({"ERROR"}, advise_here(str(error)))
             return {"CANCELLED"}
         except Exception:  # a fault of ours, which Blender shows: it calls nothing afterwards
             self._end(context, {"CANCELLED"})
@@ -178,3 +205,10 @@ class Operation:
         if self._timer is not None:
             manager.event_timer_remove(self._timer)
         return state
+
+
+def advise_here(message: str) -> str:
+    """Return a message of the library with what it advises as what is done in Blender."""
+    for advice, here in ADVICE.items():
+        message = re.sub(advice, here, message)
+    return message

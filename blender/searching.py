@@ -72,11 +72,13 @@ class EIGENSHAPE_OT_load(Operation, bpy.types.Operator):  # noqa: N801
 
     def steps(self, context: bpy.types.Context) -> Steps:
         """Add the object and make it the active one."""
-        path = Path(self.source)
+        path, active = Path(self.source), context.object
         mesh = yield lambda _: es.read_mesh(path)
         made = new_object(context, path.stem, mesh)
         made.rotation_euler.x = np.pi / 2 if self.y_up else 0.0
         context.view_layer.objects.active = made
+        if active is not None and max(active.dimensions):
+            self.note_unit(made, active)
 
 
 def chosen_folder(folder: str) -> Path:

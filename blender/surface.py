@@ -9,6 +9,8 @@ from scipy.spatial import cKDTree
 
 import eigenshape as es
 
+CONVERTIBLE = ("CURVE", "SURFACE", "FONT", "META")  # types of objects of which Blender makes meshes
+
 
 @dataclass(frozen=True)
 class Surface:
@@ -178,9 +180,9 @@ def read_surface(
             "An object must be active; none is. Click a mesh in the viewport or the outliner."
         )
     if owner.type != "MESH":
+        remedy = "Choose Object > Convert > Mesh" if owner.type in CONVERTIBLE else "Click a mesh"
         raise es.InvalidParameterError(
-            f"The object must be a mesh; {owner.name!r} is of the type {owner.type}. "
-            "Choose Object > Convert > Mesh."
+            f"The object must be a mesh; {owner.name!r} is of the type {owner.type}. {remedy}."
         )
     context.view_layer.update()  # for the world matrix of an object that was just moved
     data = evaluated_mesh(context, owner) if apply_modifiers and owner.modifiers else owner.data

@@ -78,6 +78,13 @@ def seen_mesh(owner):
     return es.TriangleMesh(coordinates(owner), faces)
 
 
+def raise_error(error):
+    def fail(*_args, **_options):
+        raise error
+
+    return fail
+
+
 def attribute(owner, name):
     return np.array([each.value for each in owner.data.attributes[name].data])
 
@@ -237,7 +244,7 @@ def test_what_cannot_be_computed_is_named(add):
     with pytest.raises(RuntimeError, match="'points' has 2 vertices and no face"):
         bpy.ops.eigenshape.heat()
     bpy.ops.object.camera_add()
-    with pytest.raises(RuntimeError, match="'Camera' is of the type CAMERA"):
+    with pytest.raises(RuntimeError, match=r"'Camera' is of the type CAMERA\. Click a mesh"):
         bpy.ops.eigenshape.bend()
 
 
@@ -458,8 +465,53 @@ def test_a_file_that_is_gone_is_named(tmp_path: Path):
 def test_a_search_needs_an_index(animal, tmp_path: Path):
     with pytest.raises(RuntimeError, match="A folder must be chosen as the index; none is"):
         bpy.ops.eigenshape.search()
-    with pytest.raises(RuntimeError, match="index"):
+    with pytest.raises(RuntimeError, match=r"or press Add to Index: it makes one there\.$"):
         bpy.ops.eigenshape.search(folder=str(tmp_path))
+    folder = str(tmp_path / "made")
+    for again in ({}, {"replace": True}):  # what both messages advise
+        assert bpy.ops.eigenshape.add_to_index(folder=folder, **again) == FINISHED
+        assert bpy.ops.eigenshape.search(folder=folder) == FINISHED
+        with pytest.raises(RuntimeError, match=r"Remove it first, or tick Replace\.$"):
+            bpy.ops.eigenshape.add_to_index(folder=folder)
+
+
+def test_a_loaded_shape_of_another_unit_is_noted(animal, creature, tmp_path: Path, capfd):
+    path = tmp_path / "large.ply"
+    for factor, is_noted in ((100.0, True), (1 / 25.4, True), (1.5, False)):
+        es.write_mesh(es.TriangleMesh(creature.vertices * factor, creature.faces), path)
+        bpy.context.view_layer.objects.active = animal
+        assert bpy.ops.eigenshape.load(source=str(path)) == FINISHED
+        text = f"is {factor:.3g} times as large as animal: perhaps its unit of length"
+        assert (text in capfd.readouterr().out) == is_noted
+
+
+@pytest.mark.parametrize(("scale", "factor"), [("auto", 10), ("auto", 0.01), ("known", 100)])
+def test_a_match_to_another_unit_is_noted(animal, add, creature, scale, factor, capfd):
+    whole = add("whole", creature.vertices, creature.faces.tolist())
+    whole.scale = [factor] * 3
+    bpy.context.view_layer.objects.active = animal
+    assert bpy.ops.eigenshape.match(scale=scale) == FINISHED
+    assert f"whole is {factor:.3g} times as large as animal" in capfd.readouterr().out
+
+
+def test_a_match_to_a_smaller_unit_advises_what_blender_has(animal, add, creature):
+    add("whole", creature.vertices / 10, creature.faces.tolist())
+    bpy.context.view_layer.objects.active = animal
+    with pytest.raises(RuntimeError, match=r"Exchange the two shapes, or set Scale to Unknown\.$"):
+        bpy.ops.eigenshape.match(scale="known")
+
+
+def test_pieces_that_a_spectrum_refuses_are_named_with_what_blender_does(add, monkeypatch):
+    """What a spectrum of many pieces advises; thousands of pieces would be made to meet it."""
+    sphere = es.icosphere(1)
+    add("sphere", sphere.vertices, sphere.faces.tolist())
+    advice = es.spectral.pencils.ADVICE
+    for text in (advice.separate, advice.pieces, advice.scales):
+        with monkeypatch.context() as patch:
+            patch.setattr(es, "cotangent_laplacian", raise_error(es.InvalidShapeError(text)))
+            with pytest.raises(RuntimeError, match="Here: tick Repair") as caught:
+                bpy.ops.eigenshape.eigenfunctions()
+        assert "command line" not in str(caught.value)
 
 
 def test_a_job_ends_at_its_next_progress_after_cancel():
