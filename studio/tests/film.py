@@ -1,6 +1,6 @@
 """Draw the film of the page on the studio: twenty seconds of the studio, moved by the mouse alone.
 
-    python studio/tests/film.py docs/pictures/film.gif
+    python studio/tests/film.py docs/pictures/film.webp
 
 A limb of a horse is bent. Its parts are shown. The scan of another pose is opened beside it, with the map between
 them. Then shapes like it are found in an index of creatures.
@@ -12,7 +12,6 @@ import tempfile
 from io import BytesIO
 from pathlib import Path
 
-import numpy as np
 from browser import (
     PANEL,
     TWO_FRAMES,
@@ -32,8 +31,7 @@ import eigenshape as es
 
 WINDOW = (1200, 750)  # pixels
 WIDTH = 720  # of the film
-N_COLORS = 255  # GIF has 256, one of which is transparent
-BIN = 6  # of 255: colors that differ by less count as one when the common ones are chosen
+QUALITY = 60  # of 100; letters stay sharp, and smooth shades need fewer bytes than the 256 colors of a GIF
 STEP = 0.09  # seconds that a frame of a motion is shown
 INDEXED = ("quadruped", "giraffe", "biped", "hand", "fish", "bird")
 COMPARE = "eigenshape.panels.find(({ id }) => id === 'compare')"
@@ -115,22 +113,12 @@ class Film:
         self.show(seconds)
 
     def save(self, path):
-        """Write the film; all frames have the same colors, so that what rests takes no bytes."""
-        palette = common_palette(self.frames)
-        first, *others = (
-            frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in self.frames
-        )
+        """Write the film."""
+        first, *others = self.frames
         times = [round(1000 * seconds) for seconds in self.seconds]
-        first.save(path, save_all=True, append_images=others, duration=times, loop=0)
-
-
-def common_palette(frames):
-    """Return an image with the colors of a film; rare ones count, or the parts would be gray."""
-    seen = np.concatenate([np.asarray(frame)[::2, ::2].reshape(-1, 3) for frame in frames[::6]])
-    colors, counts = np.unique(seen // BIN, axis=0, return_counts=True)
-    times = np.ceil(counts**0.35).astype(int)
-    pixels = np.repeat(BIN * colors + BIN // 2, times, axis=0).astype(np.uint8)
-    return Image.fromarray(pixels[None]).quantize(N_COLORS, kmeans=4)
+        first.save(
+            path, save_all=True, append_images=others, duration=times, loop=0, quality=QUALITY
+        )
 
 
 def main(path: Path, *, n_vertices: int = 3000) -> Film:

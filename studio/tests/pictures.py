@@ -2,16 +2,20 @@
 
     python studio/hatch_build.py && python studio/tests/pictures.py docs/pictures
 
-A digest of the window is written beside them, and a test compares it with that of today.
+A digest of what is shown is written beside them, and a test compares it with that of today.
 A giraffe whose head and neck are turned, its eigenfunctions, and its parts; a horse and the scan of
 another pose, with the map between them. Then figures 6.3, 6.4 and 6.13 of the thesis, by the mouse:
-knee, arm and waist of a biped, and a bar that is twisted.
+knee, arm and waist of a biped, and a bar that is twisted. Last, the report of the collection that
+docs/scans_to_figures.md makes.
 """
 
 import hashlib
 import math
+import re
+import subprocess
 import sys
 import tempfile
+from contextlib import chdir
 from functools import partial
 from io import BytesIO
 from pathlib import Path
@@ -37,7 +41,9 @@ from playwright.sync_api import Browser
 import eigenshape as es
 from eigenshape_studio.bundle import BUNDLE, read_static
 
-DIGEST = "studio.sha256"  # of the window that the pictures show
+DOCS = Path(__file__).parents[2] / "docs"
+SCANS = DOCS / "scans_to_figures.md"
+REPORT = Path(es.__file__).parent / "cli" / "steps" / "collection_report.html"
 NECK = 0.62  # height, of the whole, above which the giraffe is turned
 FIXED = 4  # number of the fixed part, after those of the four regions
 # Edits of a biped that stands from -0.98 to 1.08 with its arms spread to x = -0.91 and 0.91: the sides
@@ -81,12 +87,33 @@ def draw_shape(browser, folder, work, title, mesh, steps):
             act(page)
             page.mouse.move(5, 5)
             wait_until_still(page)
-            seen = Image.open(BytesIO(page.screenshot()))
+            save_picture(page, folder / f"studio_{name}.png")
             paths.append(folder / f"studio_{name}.png")
-            seen = seen.convert("RGB")
-            few = seen.quantize(palette=seen.quantize(256))  # a third of the bytes
-            few.save(paths[-1], optimize=True)
     return paths
+
+
+def save_picture(page, path):
+    """Save what is seen, in 256 colors, which takes a third of the bytes."""
+    seen = Image.open(BytesIO(page.screenshot())).convert("RGB")
+    seen.quantize(palette=seen.quantize(256)).save(path, optimize=True)
+
+
+def draw_report(browser, path):
+    """Make the collection of the docs, and draw its report with a specimen chosen."""
+    make, label, collect = scan_blocks()
+    with tempfile.TemporaryDirectory() as work, chdir(work):
+        exec(make + label, {})
+        subprocess.run([sys.executable, "-m", *collect.split()], check=True)
+        page = browser.new_page(viewport={"width": 1180, "height": 860})
+        page.goto(Path("hands-out/report.html").absolute().as_uri())
+        page.locator(".sheet button").first.click()
+        page.evaluate("scrollTo(0, 0)")
+        save_picture(page, path)
+
+
+def scan_blocks():
+    """Return the code of the docs that makes scans and landmarks, and the command that collects them."""
+    return re.findall(r"```(?:python|sh)\n(.*?)```", SCANS.read_text(), re.DOTALL)[:3]
 
 
 def show_deform(page):
@@ -208,15 +235,21 @@ def motion_of(page, axis):
     return math.degrees(handle["angle"]) * handle["axis"][axis]
 
 
-def digest_of_window():
-    """Return a digest of the built page, in which comments and layout of the sources are gone."""
-    return hashlib.sha256(read_static("index.html") + read_static(BUNDLE)).hexdigest()
+def digests():
+    """Return the digest of what pictures show, the built page and the report, by the file beside them."""
+    shown = {
+        "studio.sha256": read_static("index.html") + read_static(BUNDLE),
+        "collection.sha256": REPORT.read_bytes() + "".join(scan_blocks()).encode(),
+    }
+    return {name: hashlib.sha256(content).hexdigest() for name, content in shown.items()}
 
 
 if __name__ == "__main__":
-    target = Path(sys.argv[1])
+    target = Path(sys.argv[1]).resolve()
     with start_browser() as chromium:
         sys.stdout.writelines(f"{path}\n" for path in main(chromium, target))
-    draw_film(target / "film.gif")
+        draw_report(chromium, target / "collection.png")
+    draw_film(target / "film.webp")
     # Last, so that pictures of which some could not be drawn remain old
-    (target / DIGEST).write_text(f"{digest_of_window()}\n")
+    for name, digest in digests().items():
+        (target / name).write_text(f"{digest}\n")

@@ -166,6 +166,16 @@ def touch(session, kind, *places):
     session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
 
 
+@pytest.mark.parametrize("size", [PHONE, (1280, 800)])
+def test_the_picture_keeps_its_size_while_a_wheel_turns(browser, url, size):
+    busy = "panel => panel.getRootNode().querySelector('.studio').classList.toggle('busy')"
+    with open_page(browser, url, size=size) as page:
+        wait_until(page, f"{PANEL}?.limbs.farthest()")
+        stage = find(page, "stage").bounding_box()
+        find(page, "panels").evaluate(busy)
+        assert find(page, "stage").bounding_box() == stage
+
+
 def test_on_a_phone_fingers_turn_zoom_and_bend_where_they_are_told_to(browser, url, mesh):
     with open_page(browser, url, size=PHONE, more=False) as page:
         wait_until(page, f"{PANEL}?.limbs.farthest()")

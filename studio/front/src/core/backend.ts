@@ -128,6 +128,7 @@ export interface Match {
   name: string;
   label: string | null;
   score: number;
+  mirrored: boolean | null;
   up?: Vec3; // how to look at it
   towards?: Vec3;
 }

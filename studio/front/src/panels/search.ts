@@ -111,7 +111,7 @@ export class SearchPanel implements Panel {
     this.form.text("found", "");
   }
 
-  private buildCard({ name, label, score }: Match, number: number): HTMLElement {
+  private buildCard({ name, label, score, mirrored }: Match, number: number): HTMLElement {
     const png = this.found!.arrays[`thumbnail${number}`] as Uint8Array<ArrayBuffer> | undefined;
     const src = URL.createObjectURL(new Blob(png ? [png] : [], { type: "image/png" }));
     const load = () => URL.revokeObjectURL(src);
@@ -121,7 +121,7 @@ export class SearchPanel implements Panel {
       {},
       h("b", {}, `${number + 1}. ${name}`),
       label && h("span", { class: "label" }, label),
-      h("span", { class: "faint" }, `score ${score.toFixed(3)}`),
+      h("span", { class: "faint" }, `score ${score.toFixed(3)}${mirrored ? ", mirror image" : ""}`),
     );
     const title = `Show ${name} beside this shape, with corresponding points`;
     const click = () => this.openMatch(number);

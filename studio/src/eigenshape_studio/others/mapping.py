@@ -73,7 +73,7 @@ class DenseMap:
         corners = mesh.faces[there.simplices]
         images = np.einsum("pc,pcd->pd", there.weights, self.placed[side].points[corners])
         found = es.geometry.closest_points(other, images).points.copy()
-        found[(self.placed[side].partners[corners] < 0).all(axis=1)] = np.nan
+        found[self.placed[side].partners[_largest(corners, there.weights)] < 0] = np.nan
         return found
 
     def similarity(self, side: int) -> np.ndarray:

@@ -72,7 +72,12 @@ class Shelf:
         matches, arrays = [], {}
         shown = [match for match in found if match.name not in itself][:n_matches]
         for number, match in enumerate(shown):
-            facts = {"name": match.name, "label": match.label, "score": match.score}
+            facts = {
+                "name": match.name,
+                "label": match.label,
+                "score": match.score,
+                "mirrored": match.mirrored,
+            }
             picture, view = _picture(match.source)
             matches.append({**facts, **view, "path": match.source})
             ours, theirs = match.correspondences.T

@@ -366,6 +366,7 @@ class Service:
             **self._facts(match.shape),
             "score": match.score,
             "chance": match.chance,
+            "mirrored": match.mirrored,
             "n_pairs": len(match.pairs),
             "pairs": match.pairs.tolist(),
         }

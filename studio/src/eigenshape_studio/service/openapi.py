@@ -118,6 +118,10 @@ SCHEMAS = {
             "type": ["number", "null"],
             "description": "Share of unrelated shapes that would score as well, if it is known.",
         },
+        mirrored={
+            "type": ["boolean", "null"],
+            "description": "Whether the shape is rather like a mirror image of the scan, if that can be told.",
+        },
         n_pairs=WHOLE | {"description": "Number of points that correspond."},
         pairs=_list(PAIR)
         | {"description": "Vertices that correspond, of the scan and of the shape; surest first."},

@@ -55,6 +55,8 @@ class Found:
         Near 0 for the same shape; smaller is more alike.
     chance : float, optional
         Share of unrelated shapes that would score as well, where it was measured.
+    mirrored : bool, optional
+        Whether it is rather like the mirror image of the query, where that can be told.
     pairs : (p, 2) int
         Vertices that correspond: of the query, and of this shape. Surest pairs first.
     """
@@ -62,6 +64,7 @@ class Found:
     shape: Shape
     score: float
     chance: float | None
+    mirrored: bool | None
     pairs: Int[np.ndarray, "p 2"]
 
 
@@ -182,7 +185,7 @@ class ShelfReader:
             ours, theirs = match.correspondences.T
             pairs = np.column_stack([descriptor.vertices[ours], match.vertices[theirs]])
             shape = _shape_of(state.require(match.name, "be found"))
-            found.append(Found(shape, match.score, match.chance, pairs))
+            found.append(Found(shape, match.score, match.chance, match.mirrored, pairs))
         return Answer(tuple(found), matches.method, matches.n_compared, matches.nothing_alike)
 
     def shapes(

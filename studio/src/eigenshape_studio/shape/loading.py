@@ -96,7 +96,8 @@ def check_fields(values: Mapping[str, Any], n_vertices: int) -> dict[str, Field]
                 f"values must hold one finite number for each of the {n_vertices} vertices, or NaN "
                 f"where there is none, and at least one number; {title!r} has the shape "
                 f"{numbers.shape}, {np.isfinite(numbers).sum()} finite numbers and "
-                f"{np.isinf(numbers).sum()} infinite ones."
+                f"{np.isinf(numbers).sum()} infinite ones. Values "
+                "of faces become those of vertices by es.calculus.average_onto_points(mesh, values)."
             )
         # "height (m)" is a title with its unit.
         text, _, unit = str(title).removesuffix(")").partition(" (")

@@ -263,5 +263,4 @@ def _n_modes(meta: Meta) -> int | None:
 def _rim_center(mesh: es.TriangleMesh, region: np.ndarray) -> list[float]:
     """Return the mean of the vertices at the boundary of a region, about which it turns."""
     rim = es.deformation.region_boundary(mesh, es.deformation.region_mask(mesh, region))
-    center: list[float] = mesh.vertices[rim if len(rim) else region].mean(axis=0).tolist()
-    return center
+    return mesh.vertices[rim if len(rim) else region].mean(axis=0).tolist()

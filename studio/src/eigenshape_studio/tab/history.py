@@ -411,8 +411,7 @@ class History:
 
 def _load(file: SessionFile, number: int) -> Loaded:
     """Read a shape from the file of a tab."""
-    found: Loaded = unpack(file.row("shapes", number)[4])
-    return found
+    return unpack(file.row("shapes", number)[4])
 
 
 def _shape_row(shape: Shape) -> Row:

@@ -108,7 +108,7 @@ function card(match, rank, drawn, signal) {
   const line = (left, right) => make("span", "line", "", make("span", "", left), make("b", "", right));
   const lines = [
     line(match.label ?? "no label", ""),
-    line("score", match.score.toFixed(3)),
+    line("score", match.score.toFixed(3) + (match.mirrored ? ", mirror image" : "")),
     line("corresponding points", String(match.n_pairs)),
   ];
   if (match.chance !== null) lines.push(line("chance", `${Number((100 * match.chance).toPrecision(2))} %`));
