@@ -6,11 +6,11 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import connected_components
 
 from certeig.kit.arrays import all_finite, as_array, real_numbers, whole_number, whole_numbers
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike, Integer
+from eigenshape._component_loops import number_groups
 from eigenshape._errors import InvalidShapeError
 
 # Names of rows in messages, and what rows of indices refer to.
@@ -132,13 +132,19 @@ def simplex_vectors(
     return all_finite(vectors, name)
 
 
-def face_labels(value: ArrayLike, name: str, n_faces: int) -> NDArray[Any]:
+def face_labels(value: ArrayLike, name: str, mesh: Any) -> NDArray[Any]:
     """Return `value` as an array with one whole number per face, of any integer type."""
-    labels = as_array(value, name)
+    labels, n_faces = as_array(value, name), len(mesh.simplices)
     if labels.shape != (n_faces,) or labels.dtype.kind not in "iu":
+        remedy = (
+            " Labels of vertices become those of faces by labels[mesh.simplices[:, 0]]; "
+            "es.figure_field draws them as they are."
+            if labels.shape == (len(mesh.points),)
+            else ""
+        )
         raise InvalidParameterError(
             f"{name} must hold one whole number per face, shape ({n_faces},); "
-            f"the shape is {labels.shape} and the type {labels.dtype}."
+            f"the shape is {labels.shape} and the type {labels.dtype}.{remedy}"
         )
     return labels
 
@@ -162,10 +168,13 @@ def step_number(value: Integer, name: str) -> int:
 def label_components(
     n: int, one: Int[np.ndarray, " k"], two: Int[np.ndarray, " k"]
 ) -> tuple[int, Int[np.ndarray, " n"]]:
-    """Count the groups of n things of which k pairs are linked, and return the group of each."""
-    graph = sp.coo_array((np.ones(len(one), dtype=np.int8), (one, two)), shape=(n, n))
-    count, labels = connected_components(graph, directed=False)
-    return int(count), labels.astype(np.int64)
+    """Count the groups of n things of which k pairs are linked, and return the group of each.
+
+    Groups are in the order of their first things.
+    """
+    first, second = (np.ascontiguousarray(end, dtype=np.int64) for end in (one, two))
+    labels = np.empty(n, dtype=np.int64)
+    return number_groups(first, second, labels), labels
 
 
 def sorted_rows(
@@ -189,7 +198,7 @@ def number_places(points: Float[np.ndarray, "n d"]) -> Int[np.ndarray, " n"]:
 def adjacency_matrix(edges: Int[np.ndarray, "e 2"], values: np.ndarray, n: int) -> sp.csr_array:
     """Return the symmetric matrix of weighted edges, each given once."""
     both = np.concatenate([edges, edges[:, ::-1]]).T
-    return sp.coo_array((np.tile(values, 2), both), shape=(n, n)).tocsr()
+    return sp.csr_array((np.tile(values, 2), both), shape=(n, n))
 
 
 def as_affine(to_space: ArrayLike | None) -> np.ndarray:

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from eigenshape._errors import InvalidShapeError
-from eigenshape._vectors import area_vectors, size_of, unit_vectors
+from eigenshape._vectors import area_vectors, size_of, sum_rows, unit_vectors
 
 # Areas and volumes are returned if their scale is within 2^-1000..2^1000. Beyond, sums would
 # overflow, or small simplices would lose digits (floats end at 2^1024 and 2^-1074).
@@ -193,9 +193,8 @@ def half_edges(faces: Int[np.ndarray, "f 3"]) -> Int[np.ndarray, "s 2"]:
 
 def mean_normals(mesh: HasSimplices) -> Float[np.ndarray, "n 3"]:
     """Return `vertex_normals` of any surface; normals of neighbors that disagree cancel in part."""
-    vectors = area_vectors(scaled_corners(mesh)[0])
-    sums = [at_points(mesh, vectors[:, axis]) for axis in range(3)]
-    return unit_vectors(np.column_stack(sums))
+    vectors = np.repeat(area_vectors(scaled_corners(mesh)[0]), 3, axis=0)
+    return unit_vectors(sum_rows(mesh.simplices.ravel(), vectors, len(mesh.points)))
 
 
 def longest_edges(mesh: HasSimplices) -> Float[np.ndarray, " s"]:

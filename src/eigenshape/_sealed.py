@@ -332,8 +332,9 @@ def mend(kind: Kind, path: Path) -> None:
 def require_file(kind: Kind, path: Path) -> None:
     """Raise an error if there is no such file."""
     if not path.is_file():
+        more = " and is a file" if path.parent.is_file() else ""
         raise StoreError(
-            f"{path.parent} must be {kind.a_noun}; it has no {path.name}. {kind.missing}"
+            f"{path.parent} must be {kind.a_noun}; it has no {path.name}{more}. {kind.missing}"
         )
 
 

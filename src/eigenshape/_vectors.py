@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 # How much the rotation of points follows a given one, as a share of their moments: a rotation about
 # the own axis of a limb as round as a finger, or of an eye, is hardly shown by its points.
@@ -40,6 +40,26 @@ def unit_vectors(vectors: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "k 3"]:
     """Give vectors the length 1, and make zeros of those without one."""
     norms = np.linalg.norm(vectors, axis=1, keepdims=True)
     return np.divide(vectors, norms, out=np.zeros_like(vectors), where=norms > 0)
+
+
+def frames_across(normals: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "k 2 3"]:
+    """Return two unit vectors that with each unit normal form a right-handed frame."""
+    firsts = unit_vectors(np.cross(np.eye(3)[np.abs(normals).argmin(axis=1)], normals))
+    return np.stack([firsts, np.cross(normals, firsts)], axis=1)
+
+
+def row_dots(
+    one: Float[np.ndarray, "k d"], two: Float[np.ndarray, "k d"]
+) -> Float[np.ndarray, " k"]:
+    """Return the inner product of each row with the same row of another table."""
+    return np.einsum("ki,ki->k", one, two)
+
+
+def sum_rows(
+    groups: Int[np.ndarray, " k"], rows: Float[np.ndarray, "k c"], n_groups: int = 0
+) -> Float[np.ndarray, "g c"]:
+    """Return the sum of the rows of each group; of groups beyond those that occur, zeros."""
+    return np.column_stack([np.bincount(groups, column, n_groups) for column in rows.T])
 
 
 def area_vectors(corners: Float[np.ndarray, "f 3 3"]) -> Float[np.ndarray, "f 3"]:

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 import time
+import warnings
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -235,8 +236,7 @@ def schedule_work(
     pool: ProcessPool, work: Callable[[Path], T], path: Path, workers: Workers
 ) -> "Future[Outcome[T]]":
     """Call a function on a path in a worker; `outcome_of` tells what came of it."""
-    future: Future[Outcome[T]] = pool.schedule(_work, args=[work, path], timeout=workers.timeout)
-    return future
+    return pool.schedule(_work, args=[work, path], timeout=workers.timeout)
 
 
 @contextmanager
@@ -303,6 +303,8 @@ def _start_worker(memory: int | None, prepare: Callable[[], object] | None = Non
         resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # where it could not be blocked
     threading.Thread(target=_die_with_parent, daemon=True).start()
+    # A warning names its file; the line of our code that gave it tells a user nothing.
+    warnings.formatwarning = lambda message, *_, **__: f"warning: {message}\n"
     threadpool_limits(1)
     set_threads(1)
     if prepare is not None:

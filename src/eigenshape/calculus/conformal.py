@@ -10,9 +10,9 @@ from certeig.kit.errors import ConvergenceError, InvalidParameterError
 from certeig.kit.progress import Progress, silent
 from certeig.kit.typing import ArrayLike, Integer
 from eigenshape._arrays import require_finite_rows, step_number
-from eigenshape._corners import scaled_corners, triangular_sides
+from eigenshape._corners import at_points, scaled_corners, triangular_sides
 from eigenshape._errors import InvalidShapeError
-from eigenshape._vectors import scale_to_unit, size_one, triangle_areas
+from eigenshape._vectors import row_dots, scale_to_unit, size_one, triangle_areas
 from eigenshape.calculus.linear_solver import LinearSolver, factor_definite
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_areas
@@ -112,7 +112,7 @@ def flatten_conformally(mesh: MeshLike) -> Float[np.ndarray, "n 2"]:
     # The Hermitian M with zᴴMz the signed area of z, from the boundary edges:
     # Im(conj(z_tail) z_head) / 2 for each.
     quarter = np.full(len(rim), -0.25j)
-    half = sp.coo_array((quarter, rim.T), shape=laplacian.mass.shape).tocsr()
+    half = sp.csr_array((quarter, rim.T), shape=laplacian.mass.shape)
     energy = as_real(laplacian.stiffness - 2 * (half + half.conj().T))
     mass = sp.kron(laplacian.mass, sp.eye_array(2))
     shift = SHIFT * energy.diagonal().max() / mass.diagonal().max()
@@ -220,9 +220,7 @@ def map_to_sphere(
     for number in range(most):
         report_progress(number / most, f"step {number + 1}, radii differ by {least:.2g}")
         areas = triangle_areas(points[mesh.faces])
-        weights = np.bincount(
-            mesh.faces.ravel(), weights=np.repeat(areas / 3, 3), minlength=mesh.n_vertices
-        )
+        weights = at_points(mesh, areas / 3)
         # Moved to the center and scaled to area 4π, so that the limit is the unit sphere.
         factor = 4 * np.pi / areas.sum()
         points = (points - weights @ points / weights.sum()) * np.sqrt(factor)
@@ -269,7 +267,7 @@ def map_to_sphere(
 def _turned_faces(mesh: TriangleMesh, sphere: Float[np.ndarray, "n 3"]) -> Int[np.ndarray, " t"]:
     """Return the faces that lie the other way than most."""
     a, b, c = sphere[mesh.faces].transpose(1, 0, 2)
-    heights = np.einsum("fi,fi->f", a, np.cross(b - a, c - a))
+    heights = row_dots(a, np.cross(b - a, c - a))
     if np.median(heights) < 0:  # a surface that faces inward
         heights = -heights
     # Places on the sphere are rounded by about 1e-16, which decides how triangles lie whose height
@@ -296,12 +294,12 @@ def _relax_around(
         one, two = points[j] - points[i], points[k] - points[i]
         lengths = np.linalg.norm([one, two], axis=2)
         area = np.linalg.norm(np.cross(one, two), axis=1)
-        half_angle = area / (lengths.prod(axis=0) + np.einsum("fi,fi->f", one, two))  # its tangent
+        half_angle = area / (lengths.prod(axis=0) + row_dots(one, two))  # its tangent
         rows += [i, i]
         columns += [j, k]
         weights += [half_angle / lengths[0], half_angle / lengths[1]]
     indices = (np.concatenate(rows), np.concatenate(columns))
-    means = sp.coo_array((np.concatenate(weights), indices), shape=(n, n)).tocsr()
+    means = sp.csr_array((np.concatenate(weights), indices), shape=(n, n))
     means = sp.diags_array(1 / means.sum(axis=1)) @ means
     is_free = np.zeros(n, dtype=bool)
     is_free[mesh.faces[faces]] = True

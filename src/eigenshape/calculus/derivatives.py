@@ -12,6 +12,7 @@ from certeig.kit.typing import ArrayLike
 from eigenshape._arrays import point_functions, require_finite_rows, simplex_vectors
 from eigenshape._corners import barycentric_gradients, in_length, scaled_corners, volumes_of
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import sum_rows
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.measure import face_normals
 from eigenshape.geometry.mesh import TriangleMesh
@@ -257,16 +258,15 @@ def _point_rows(mesh: Mesh, weights: Float[np.ndarray, "s corners ..."]) -> sp.c
     columns = ambient * np.arange(s)[:, None, None, None] + np.arange(ambient)
     places = (rows.ravel(), np.broadcast_to(columns, entries.shape).ravel())
     shape = (width * mesh.n_points, ambient * s)
-    return sp.coo_array((entries.ravel(), places), shape=shape).tocsr()
+    return sp.csr_array((entries.ravel(), places), shape=shape)
 
 
 def sum_at_nodes(
     nodes: Int[np.ndarray, "s corners"], n: int, shares: Float[np.ndarray, "s corners ..."]
 ) -> Float[np.ndarray, "n ..."]:
     """Add the shares of all corners at their nodes."""
-    columns = shares.reshape(nodes.size, -1).T
-    sums = [np.bincount(nodes.ravel(), weights=column, minlength=n) for column in columns]
-    return np.stack(sums, axis=1).reshape(n, *shares.shape[2:])
+    sums = sum_rows(nodes.ravel(), shares.reshape(nodes.size, -1), n)
+    return sums.reshape(n, *shares.shape[2:])
 
 
 def average_onto_points(mesh: MeshLike, values: ArrayLike) -> Float[np.ndarray, "n ..."]:

@@ -4,7 +4,6 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
 
-from certeig.kit.arguments import require_type
 from certeig.kit.arrays import whole_number
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike, Integer
@@ -49,7 +48,6 @@ def polyharmonic_matrix(laplacian: Laplacian, order: Integer = 2) -> sp.csr_arra
     >>> bool(abs(Q.sum(axis=1)).max() < 1e-12)
     True
     """
-    require_type(laplacian, Laplacian, "laplacian")
     require_matrix(laplacian)
     count = whole_number(order, "order", 1, MOST_ORDER, "the matrix has no accuracy left beyond")
     stiffness, mass = laplacian.stiffness, laplacian.mass

@@ -117,7 +117,6 @@ def solve_poisson(
     >>> bool(abs(u - z).max() < 0.01)
     True
     """
-    require_type(laplacian, Laplacian, "laplacian")
     require_matrix(laplacian)
     weights = laplacian.mass.sum(axis=1)
     solver = factor_equations(laplacian.stiffness, fixed, weights=weights)
@@ -170,7 +169,6 @@ def solve_helmholtz(
     kappa = finite_number(squared_wavenumber, "squared_wavenumber")
     if kappa == 0:
         return solve_poisson(laplacian, source, load=load, fixed=fixed, values=values)
-    require_type(laplacian, Laplacian, "laplacian")
     require_matrix(laplacian)
     matrix = laplacian.stiffness - kappa * laplacian.mass
     solver = factor_definite(matrix, fixed, indefinite=bool(kappa > 0))
@@ -243,7 +241,6 @@ def solve_heat(  # noqa: PLR0913 - one keyword for each part of the equation
     >>> es.calculus.solve_heat(bar, np.zeros(5), 10.0, n_steps=20, **ends).round(6).tolist()
     [0.0, 0.25, 0.5, 0.75, 1.0]
     """
-    require_type(laplacian, Laplacian, "laplacian")
     require_matrix(laplacian)
     count = step_number(n_steps, "n_steps")
     time = positive_number(t, "t")

@@ -114,9 +114,9 @@ def geodesic_path(
     mesh, (first, final) = _insert_stops(mesh, {"start": start, "end": end})
     stops = [first, *between, final]
     # The shortest path along edges through all stops.
-    graph = sp.coo_array(
+    graph = sp.csr_array(
         (edge_lengths(mesh), edge_table(mesh).edges.T), shape=(mesh.n_vertices,) * 2
-    ).tocsr()
+    )
     path = stops[:1]
     for one, two in pairwise(stops):
         if one == two:

@@ -4,7 +4,7 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
 
-from certeig.kit.arrays import ReadOnly, positive_number, record
+from certeig.kit.arrays import TINY, ReadOnly, positive_number, record
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.progress import Progress, silent
 from certeig.kit.typing import ArrayLike
@@ -295,7 +295,7 @@ def require_heat(
     Each edge takes a factor from it, of about 0.4 with the usual time; so 750 edges are too many.
     """
     # Below the normal floats digits are lost, and with them directions.
-    cold = np.argwhere(reached & (np.abs(heat) < np.finfo(np.float64).tiny))
+    cold = np.argwhere(reached & (np.abs(heat) < TINY))
     if len(cold):
         raise InvalidParameterError(
             f"Heat from the sources must reach every point; at point {cold[0, 0]} it is too small "

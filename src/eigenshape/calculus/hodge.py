@@ -12,7 +12,7 @@ from certeig.kit.progress import Progress, silent
 from certeig.kit.typing import ArrayLike
 from eigenshape._arrays import require_finite_rows
 from eigenshape._corners import scaled_corners
-from eigenshape._vectors import area_vectors
+from eigenshape._vectors import area_vectors, row_dots
 from eigenshape.calculus.derivatives import sum_at_nodes
 from eigenshape.calculus.linear_solver import factorize_grounded
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -149,7 +149,7 @@ def decompose_field(
         )
     require_finite_rows(field, "vectors", "face")
     normals, _ = _normals_and_areas(mesh)
-    along = np.einsum("fd,fd->f", field, normals)
+    along = row_dots(field, normals)
     bad = np.flatnonzero(np.abs(along) > TANGENT * np.linalg.norm(field, axis=1))
     if bad.size:
         raise InvalidParameterError(

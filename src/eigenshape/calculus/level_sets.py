@@ -9,7 +9,7 @@ from certeig.kit.typing import ArrayLike
 from eigenshape._arrays import point_functions, vertex_values
 from eigenshape._corners import cut_tetrahedra, in_length, volumes
 from eigenshape._errors import InvalidShapeError
-from eigenshape._vectors import size_one
+from eigenshape._vectors import row_dots, size_one
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.mesh import TriangleMesh
 
@@ -243,6 +243,6 @@ def level_set(mesh: MeshLike, values: ArrayLike, level: float) -> LevelSet:
         is_upper = heights[one] > heights[two]
         upper, lower = np.where(is_upper, one, two), np.where(is_upper, two, one)
         place, _ = size_one(mesh.points)
-        wrong = np.einsum("qi,qi->q", normals, place[upper] - place[lower]) < 0
+        wrong = row_dots(normals, place[upper] - place[lower]) < 0
         pieces = np.where(wrong[:, None], pieces[:, ::-1], pieces)
-    return LevelSet(float(wanted), points, pieces, edges, shares)
+    return LevelSet(wanted, points, pieces, edges, shares)

@@ -17,6 +17,8 @@ from certeig.sparse.symmetric_factor import SymmetricFactor
 from eigenshape._arrays import point_functions, require_finite_rows
 from eigenshape._errors import InvalidShapeError
 
+Columns = Float[np.ndarray, "n k"]
+
 # Loads on a component where nothing is fixed may sum to this share of their absolute sum. Sums of a
 # million numbers round to 1e-10 of it at most; a source that is not balanced is far above.
 BALANCED = 1e-9
@@ -152,7 +154,7 @@ class LinearSolver(ReadOnly):
 
     def _solve_pinned(
         self, load: Float[np.ndarray, "n w"], at_fixed: Float[np.ndarray, "c v"], width: int
-    ) -> Float[np.ndarray, "n k"]:
+    ) -> Columns:
         """Solve with the first point of each floating component at 0."""
         found = np.zeros((self.n_points, width))
         found[self.fixed] = at_fixed
@@ -167,7 +169,7 @@ class LinearSolver(ReadOnly):
         found[self.free] = inner
         return found
 
-    def _require_balanced(self, load: Float[np.ndarray, "n k"]) -> None:
+    def _require_balanced(self, load: Columns) -> None:
         """Raise an error if loads do not sum to zero on a floating component."""
         sums, sizes = self.floating_sums(load), self.floating_sums(np.abs(load))
         bad = np.argwhere(np.abs(sums) > BALANCED * sizes)
@@ -181,7 +183,7 @@ class LinearSolver(ReadOnly):
                 "Pass es.calculus.remove_means(laplacian, source) as the source, or fix a point."
             )
 
-    def floating_sums(self, load: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "u k"]:
+    def floating_sums(self, load: Columns) -> Float[np.ndarray, "u k"]:
         """Return the sums of loads over each component that is determined up to a constant.
 
         Parameters
@@ -196,7 +198,7 @@ class LinearSolver(ReadOnly):
         )
         return members @ load
 
-    def _without_means(self, found: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
+    def _without_means(self, found: Columns) -> Columns:
         """Subtract the weighted mean over each floating component."""
         inside = self.floating >= 0
         if not inside.any():
@@ -240,10 +242,10 @@ class Constraints:
     def correct(
         self,
         solver: LinearSolver,
-        start: Float[np.ndarray, "n k"],
+        start: Columns,
         load: Float[np.ndarray, "n w"],
         targets: Float[np.ndarray, "p v"],
-    ) -> Float[np.ndarray, "n k"]:
+    ) -> Columns:
         """Return the solution that meets the constraints, given that without them.
 
         Raise InvalidParameterError if the constraints conflict, or leave a component where loads do
@@ -488,7 +490,7 @@ class GroundedFactor(ReadOnly):
     free: Int[np.ndarray, " f"]
     factor: SymmetricFactor | None
 
-    def solve(self, loads: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
+    def solve(self, loads: Columns) -> Columns:
         """Solve W x = loads, which sum to 0 on each component without a fixed point."""
         solution = np.zeros(loads.shape)
         if self.factor is not None:

@@ -202,9 +202,7 @@ def _whitney_mass(mesh: Mesh, edges: Int[np.ndarray, "e 2"]) -> sp.csr_array:
     numbers = np.searchsorted(keys, corners[:, i] * mesh.n_points + corners[:, j])
     rows = np.broadcast_to(numbers[:, :, None], local.shape)
     columns = np.broadcast_to(numbers[:, None, :], local.shape)
-    full = sp.coo_array(
-        (local.ravel(), (rows.ravel(), columns.ravel())), shape=(len(edges),) * 2
-    ).tocsr()
+    full = sp.csr_array((local.ravel(), (rows.ravel(), columns.ravel())), shape=(len(edges),) * 2)
     return ((full + full.T) / 2).tocsr()
 
 
@@ -213,7 +211,7 @@ def _differentials(mesh: Mesh, edges: Int[np.ndarray, "e 2"]) -> tuple[sp.csr_ar
     n, number = mesh.n_points, np.arange(len(edges))
     ends = (np.tile(number, 2), edges.T.ravel())
     signs = np.repeat([-1.0, 1.0], len(edges))
-    d0 = sp.coo_array((signs, ends), shape=(len(edges), n)).tocsr()
+    d0 = sp.csr_array((signs, ends), shape=(len(edges), n))
     rows = np.sort(mesh.simplices, axis=1) if mesh.dim == 2 else facet_table(mesh).facets
     keys = _edge_keys(edges, n)
     sides = [
@@ -221,5 +219,5 @@ def _differentials(mesh: Mesh, edges: Int[np.ndarray, "e 2"]) -> tuple[sp.csr_ar
     ]
     signs = np.repeat([1.0, 1.0, -1.0], len(rows))
     places = (np.tile(np.arange(len(rows)), 3), np.concatenate(sides))
-    d1 = sp.coo_array((signs, places), shape=(len(rows), len(edges))).tocsr()
+    d1 = sp.csr_array((signs, places), shape=(len(rows), len(edges)))
     return d0, d1

@@ -109,7 +109,7 @@ def point_on_side(
 ) -> Float[np.ndarray, "3"]:
     """Return the point at a share of the way from the tail of a side to its head."""
     tail, head = mesh.vertices[sides.tails[side]], mesh.vertices[sides.heads[side]]
-    return np.asarray((1 - share) * tail + share * head)
+    return (1 - share) * tail + share * head
 
 
 def as_path(points: Float[np.ndarray, "p 3"]) -> GeodesicPath:

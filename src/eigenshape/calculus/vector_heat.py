@@ -27,6 +27,8 @@ from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.directions import Directions, half_cotangents, vertex_directions
 from eigenshape.operators.robust import robust_laplacian
 
+Field = Complex[np.ndarray, " n"]
+
 
 @record
 class VectorHeat(ReadOnly):
@@ -299,7 +301,7 @@ def as_mesh_heat(mesh: MeshLike | VectorHeat) -> MeshVectorHeat:
     return solver
 
 
-def as_rows(field: Complex[np.ndarray, " n"]) -> Float[np.ndarray, "n 2"]:
+def as_rows(field: Field) -> Float[np.ndarray, "n 2"]:
     """Return complex numbers as vectors of two coordinates."""
     return np.column_stack([field.real, field.imag])
 
@@ -316,13 +318,13 @@ def require_source_everywhere(solver: VectorHeat, sources: Int[np.ndarray, " k"]
         )
 
 
-def diffuse(solver: VectorHeat, field: Complex[np.ndarray, " n"]) -> Complex[np.ndarray, " n"]:
+def diffuse(solver: VectorHeat, field: Field) -> Field:
     """Solve (B + tW) x = field for tangent vectors."""
     solution = solver.vector_heat.solve(as_rows(field).reshape(-1, 1))[:, 0]
     return solution[::2] + 1j * solution[1::2]
 
 
-def normalize(field: Complex[np.ndarray, " n"]) -> Complex[np.ndarray, " n"]:
+def normalize(field: Field) -> Field:
     """Return vectors of length 1, and 0 for 0."""
     # Far away vectors are as short as 1e-300, whose squares underflow.
     largest = np.maximum(np.abs(field.real), np.abs(field.imag))
@@ -356,9 +358,7 @@ def scalar_impulse(solver: VectorHeat, start: int) -> Float[np.ndarray, " n"]:
     return heat[:, 0]
 
 
-def edge_sums(
-    solver: MeshVectorHeat, field: Complex[np.ndarray, " n"]
-) -> Complex[np.ndarray, " h"]:
+def edge_sums(solver: MeshVectorHeat, field: Field) -> Complex[np.ndarray, " h"]:
     """Add the vectors at both ends of each side, in the frame of its tail."""
     tails, heads = side_ends(solver.mesh.faces)
     _, _, turns, _ = side_vectors(solver)

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from certeig.kit.arguments import describe_value, require_type
-from certeig.kit.arrays import ReadOnly, record, whole_number
+from certeig.kit.arrays import TINY, ReadOnly, record, whole_number
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import Integer
@@ -274,7 +274,7 @@ def _fit_shares(
         if not known.all():
             # Least squares where the indicator is known, and smooth elsewhere. Where it is known
             # everywhere, the modes are orthonormal with respect to the areas.
-            relative_values = values / max(values[-1], np.finfo(float).tiny)
+            relative_values = values / max(values[-1], TINY)
             stiff = np.diag(stiffness * relative_values**2)
             goal = np.linalg.solve(gram[:n_modes, :n_modes] + stiff, goal)
         fit = modes @ goal

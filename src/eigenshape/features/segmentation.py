@@ -191,7 +191,7 @@ def adjacent_parts(mesh: MeshLike, labels: Int[np.ndarray, " f"]) -> Int[np.ndar
            [1, 2]])
     """
     mesh = as_mesh(mesh)
-    parts = face_labels(labels, "labels", mesh.n_faces)
+    parts = face_labels(labels, "labels", mesh)
     faces, _ = edge_table(mesh).face_pairs
     pairs = np.sort(parts[faces], axis=1)
     return np.unique(pairs[pairs[:, 0] != pairs[:, 1]], axis=0)

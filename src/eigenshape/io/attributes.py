@@ -12,7 +12,7 @@ from certeig.kit.arguments import require_type
 from certeig.kit.arrays import ReadOnly, record
 from certeig.kit.text import html_repr
 from eigenshape._arrays import number_places
-from eigenshape._vectors import area_vectors, unit_vectors
+from eigenshape._vectors import area_vectors, sum_rows, unit_vectors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.opening import SourceFile
 
@@ -205,8 +205,7 @@ def corner_normals(
     places = number_places(attributes.mesh.vertices)[attributes.mesh.faces.ravel()]
     groups = number_places(np.column_stack([places, np.rint(old * SAME_NORMAL)]))
     vectors = np.repeat(area_vectors(mesh.vertices[mesh.faces]), 3, axis=0)
-    sums = np.column_stack([np.bincount(groups, weights=column) for column in vectors.T])
-    normals = unit_vectors(sums[groups])
+    normals = unit_vectors(sum_rows(groups, vectors)[groups])
     # A corner of faces without area keeps its old normal.
     return np.where(normals.any(axis=1, keepdims=True), normals, old).reshape(-1, 3, 3)
 

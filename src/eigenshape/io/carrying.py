@@ -9,7 +9,7 @@ from scipy.sparse import csr_array
 
 from eigenshape._arrays import number_places, sorted_rows
 from eigenshape._corners import mean_normals
-from eigenshape._vectors import area_vectors, size_one, unit_vectors
+from eigenshape._vectors import area_vectors, row_dots, size_one, unit_vectors
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.distances.closest import closest_points
 from eigenshape.geometry.distances.closest_loops import nearest_around
@@ -208,7 +208,7 @@ def _nearest_faces(
         twins = first[old_sides[nearest] ^ 1]
         normals = unit_vectors(area_vectors(corners))
         old_normals = unit_vectors(area_vectors(old.vertices[old.faces[nearest]]))
-        looks_away = np.einsum("fi,fi->f", normals, old_normals) < 0
+        looks_away = row_dots(normals, old_normals) < 0
         found[left] = np.where(looks_away & (twins >= 0), twins, nearest)
     return found, left
 
@@ -234,10 +234,8 @@ def _corner_places(
     middles = wanted.mean(axis=1, keepdims=True)
     radii = np.linalg.norm(wanted - middles, axis=2).max(axis=1)
     gaps = np.linalg.norm(corners[starts].mean(axis=1) - middles[:, 0], axis=1)
-    found: tuple[np.ndarray, np.ndarray] = nearest_around(
-        wanted, middles[:, 0], starts, (REACH * np.maximum(radii, gaps)) ** 2, corners, neighbors
-    )
-    return found
+    reach = REACH * np.maximum(radii, gaps)
+    return nearest_around(wanted, middles[:, 0], starts, reach**2, corners, neighbors)
 
 
 def _neighbors(

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from certeig.kit.arguments import require_each
 from certeig.kit.errors import FileFormatError
-from certeig.kit.files import as_path, read_regular, replacing
+from certeig.kit.files import as_path, read_regular, replacing, require_regular
 from eigenshape.deformation.edits import Edit, edits_from_json, edits_to_json
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 
@@ -89,6 +89,7 @@ def read_edits(path: str | Path, mesh: MeshLike) -> list[Edit]:
     1
     """
     mesh, path = as_mesh(mesh), as_path(path)
+    require_regular(path)
     try:
         content = json.loads(read_regular(path, "edits"))
     except (ValueError, RecursionError) as err:

@@ -11,6 +11,7 @@ from certeig.kit.errors import FileFormatError
 from certeig.kit.files import read_regular, replace_file
 from eigenshape.io.formats.numbers import INT64, lines_of, whole, whole_table
 from eigenshape.io.formats.ply import parse_labels
+from eigenshape.io.formats.registry import PARCEL_FORMATS, suffix_in
 from eigenshape.io.opening import naming
 
 LABEL_SUFFIXES = (".seg", ".txt", ".json")  # of files of labels, in the order of search
@@ -40,9 +41,14 @@ def read_labels(path: Path) -> Int[np.ndarray, " f"]:
 
     A file has one label a line, the list "face_labels" in .json, or the property `label` in .ply.
 
-    Raise FileFormatError if a line or an entry is not a whole number, or if there is no such list,
-    and OSError if the system cannot open the file.
+    Raise FileFormatError if a line or an entry is not a whole number, if there is no such list, or if
+    the file holds labels of vertices, and OSError if the system cannot open the file.
     """
+    if suffix_in(path.name) in PARCEL_FORMATS:
+        raise FileFormatError(
+            f"Labels must be those of faces; {path} holds parcels of vertices. Write "
+            "es.io.read_parcellation(path, mesh).labels[mesh.faces[:, 0]] to a .txt file, one a line."
+        )
     data, suffix = read_regular(path, "labels"), path.suffix.lower()
     with naming(path):
         if suffix == ".ply":

@@ -1,9 +1,13 @@
 """Labels of faces, and maps between vertices, in files; meshes with labels beside them."""
 
+from collections.abc import Sequence
 from pathlib import Path
+
+from scipy.spatial import cKDTree
 
 from certeig.kit.errors import FileFormatError
 from certeig.kit.files import as_path
+from eigenshape.geometry.repairs.repair import repair as apply_repairs
 from eigenshape.io.formats.registry import MESH_FORMATS
 from eigenshape.io.label_files import find_labels, read_labels
 from eigenshape.io.mesh_files import read_mesh
@@ -12,7 +16,9 @@ from eigenshape.retrieval.labels.labeled_shape import LabeledShape
 NAMES_FILE = "names.txt"  # in a folder of labeled shapes: the name of label k in line k + 1
 
 
-def read_labeled_shape(path: str | Path, labels: str | Path | None = None) -> LabeledShape:
+def read_labeled_shape(
+    path: str | Path, labels: str | Path | None = None, *, repair: Sequence[str] = ()
+) -> LabeledShape:
     r"""Read a mesh and the labels of its faces.
 
     Parameters
@@ -23,17 +29,23 @@ def read_labeled_shape(path: str | Path, labels: str | Path | None = None) -> La
         One label a line (``.seg``, ``.txt``), the list ``face_labels`` (``.json``), or the property
         ``label`` of faces (``.ply``). By default the file of one of these kinds that lies beside
         the mesh and has its name, or the mesh itself if it is a PLY file.
+    repair : sequence of str
+        Names of repairs, as `es.repair` takes them, such as ["auto"]. Repairs remove and split
+        faces: each takes the label of the nearest one of the file.
 
     Returns
     -------
     LabeledShape
+        Its report says what was repaired.
 
     Raises
     ------
     FileFormatError
         If there are no labels, or a label is not a whole number.
     InvalidParameterError
-        If there is not one label for each face.
+        If there is not one label for each face of the file, or as in `es.repair`.
+    InvalidShapeError
+        As in `es.repair`.
     OSError
         If a file cannot be read.
 
@@ -52,11 +64,20 @@ def read_labeled_shape(path: str | Path, labels: str | Path | None = None) -> La
     {3}
     """
     path = as_path(path)
+    mesh = read_mesh(path)
     found = find_labels(path) if labels is None else Path(labels)
-    return LabeledShape(read_mesh(path), read_labels(found))
+    given = LabeledShape(mesh, read_labels(found))
+    done = apply_repairs(given.mesh, repair)
+    if not done.report:
+        return given
+    middles = [mesh.vertices[mesh.faces].mean(axis=1) for mesh in (given.mesh, done.mesh)]
+    nearest = cKDTree(middles[0]).query(middles[1])[1]
+    return LabeledShape(done.mesh, given.labels[nearest], done.report)
 
 
-def read_labeled_shapes(folder: str | Path) -> dict[str, LabeledShape]:
+def read_labeled_shapes(
+    folder: str | Path, *, repair: Sequence[str] = ()
+) -> dict[str, LabeledShape]:
     """Read all labeled shapes of a folder, for `transfer_labels`.
 
     Each mesh has its labels beside it, as `read_labeled_shape` takes them. Equal labels must mean
@@ -65,6 +86,8 @@ def read_labeled_shapes(folder: str | Path) -> dict[str, LabeledShape]:
     Parameters
     ----------
     folder : path
+    repair : sequence of str
+        As in `read_labeled_shape`.
 
     Returns
     -------
@@ -75,6 +98,8 @@ def read_labeled_shapes(folder: str | Path) -> dict[str, LabeledShape]:
     ------
     FileFormatError
         If there is no mesh in the folder, or as in `read_labeled_shape`.
+    InvalidParameterError, InvalidShapeError
+        As in `read_labeled_shape`.
     OSError
         If the folder or a file cannot be read.
 
@@ -96,7 +121,7 @@ def read_labeled_shapes(folder: str | Path) -> dict[str, LabeledShape]:
     True
     """
     return {
-        path.stem: read_labeled_shape(path)
+        path.stem: read_labeled_shape(path, repair=repair)
         for path in find_labeled_shapes(as_path(folder, "folder"))
     }
 

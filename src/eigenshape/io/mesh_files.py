@@ -31,6 +31,8 @@ from eigenshape.io.formats.rounding import loss_in_single
 from eigenshape.io.opening import SourceFile, naming, open_file
 
 KINDS = {2: SEGMENTS, 3: "triangles"}  # of cells, by their number of corners
+# What programs for terrain write for a height that is not known: GDAL, ArcGIS; SRTM
+NOT_MEASURED = (-9999, -32768)
 REPLACED = {
     "vertex colors": "vertex colors, since each part has a color of its own",
     "materials": "materials and images, since each part has a material of its own",
@@ -161,7 +163,8 @@ def parse_file(
     Warns
     -----
     UserWarning
-        If hexahedra, wedges or pyramids were split, or the format's `parse` returned notes.
+        If hexahedra, wedges or pyramids were split, the lowest coordinate is one of `NOT_MEASURED`, or
+        the format's `parse` returned notes.
     """
     known = format_of(source.suffix)
     options = source.options
@@ -176,6 +179,11 @@ def parse_file(
     simplices = select_cells(points, blocks, cells)
     if simplices.shape[1] == 4 and (sentence := split_sentence(blocks)):
         notes.append(sentence)
+    if np.isin(points.min(axis=0, initial=0), NOT_MEASURED).any():
+        notes.append(
+            "its lowest coordinate is one that programs write where they measured nothing "
+            f"({', '.join(map(str, NOT_MEASURED))}); if so, leave out the points that have it"
+        )
     for note in notes:
         warnings.warn(f"{source.path}: {note}", stacklevel=4)
     return points, simplices
@@ -232,8 +240,7 @@ def _read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
     module = format_of(source.suffix).load_attributes()
     if module is None:
         return MeshAttributes.plain(mesh)
-    attributes: MeshAttributes = module.read_attributes(source, mesh)
-    return attributes
+    return module.read_attributes(source, mesh)
 
 
 def require_surface(points: np.ndarray, simplices: np.ndarray) -> None:

@@ -72,11 +72,9 @@ class ModeAlignment(ReadOnly):
         if n_joint:
             text += f"{n_joint} modes lie in groups whose eigenvalues are too close to tell one from another. "
         if len(self.lost):
-            first = self.lost[0]
-            text += (
-                f"{len(self.lost)} groups are not those of the reference; the first is modes "
-                f"{self.starts[first]} to {self.stops[first] - 1}."
-            )
+            start, last = self.starts[self.lost[0]], self.stops[self.lost[0]] - 1
+            modes = f"mode {start}" if start == last else f"modes {start} to {last}"
+            text += f"{len(self.lost)} groups are not those of the reference; the first is {modes}."
         return text.rstrip()
 
 

@@ -7,7 +7,6 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 from scipy.sparse.csgraph import connected_components
 
-from certeig.kit.arguments import require_type
 from certeig.kit.arrays import ReadOnly, record, whole_number
 from certeig.kit.typing import Integer
 from eigenshape.operators.laplacian import Laplacian
@@ -109,7 +108,6 @@ def nodal_parcels(laplacian: Laplacian, n_parcels: Integer) -> ParcelTree:
     >>> bool(abs(found.sizes / found.sizes.sum() - 0.25).max() < 0.03)
     True
     """
-    require_type(laplacian, Laplacian, "laplacian")
     require_matrix(laplacian)
     n = laplacian.n_points
     count = whole_number(n_parcels, "n_parcels", 1, n)

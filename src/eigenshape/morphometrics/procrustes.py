@@ -7,7 +7,6 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.linalg import lstsq
 from scipy.spatial.distance import cdist
-from scipy.stats import iqr
 
 from certeig.kit.arguments import require_choice
 from certeig.kit.arrays import ReadOnly, real_numbers, record, whole_numbers
@@ -83,7 +82,8 @@ class ProcrustesFit(ReadOnly):
         these first: exchanged or misplaced landmarks are among them.
         """
         distances = np.linalg.norm(self.shapes - self.mean, axis=(1, 2))
-        far = distances > np.quantile(distances, 0.75) + FENCE * iqr(distances)
+        lower, upper = np.quantile(distances, [0.25, 0.75])
+        far = distances > upper + FENCE * (upper - lower)
         order = np.argsort(-distances, kind="stable")
         return order[far[order]]
 

@@ -6,7 +6,7 @@ from jaxtyping import Complex, Float
 
 from eigenshape._corners import edge_keys, side_ends
 from eigenshape._errors import InvalidShapeError
-from eigenshape._vectors import size_one
+from eigenshape._vectors import row_dots, size_one
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_areas, vertex_normals
@@ -147,7 +147,7 @@ def tangent_frames(mesh: MeshLike | PointCloud) -> Float[np.ndarray, "n 2 3"]:
     if isinstance(mesh, PointCloud):
         normals = cloud_normals(mesh)
         axes = np.eye(3)[np.abs(normals).argmin(axis=1)]
-        first = axes - np.einsum("nd,nd->n", axes, normals)[:, None] * normals
+        first = axes - row_dots(axes, normals)[:, None] * normals
         first /= np.linalg.norm(first, axis=1, keepdims=True)
         return np.stack([first, np.cross(normals, first)], axis=1)
     mesh = as_mesh(mesh)
@@ -157,7 +157,7 @@ def tangent_frames(mesh: MeshLike | PointCloud) -> Float[np.ndarray, "n 2 3"]:
     _, heads = side_ends(mesh.faces)
     along = points[heads[sides.first]] - points
     lengths = np.linalg.norm(along, axis=1)
-    along = along - np.einsum("ij,ij->i", along, normals)[:, None] * normals
+    along = along - row_dots(along, normals)[:, None] * normals
     left = np.linalg.norm(along, axis=1)
     bad = np.flatnonzero((left <= 1e-12 * lengths) | (np.linalg.norm(normals, axis=1) == 0))
     if bad.size:
@@ -193,7 +193,7 @@ def _transport_matrix(
 ) -> sp.csr_array:
     """Put the entry of each side where it acts on its tail and counts at its head, and the conjugate the other way."""
     tails, heads = side_ends(mesh.faces)
-    half = sp.coo_array((entries, (heads, tails)), shape=(mesh.n_vertices,) * 2).tocsr()
+    half = sp.csr_array((entries, (heads, tails)), shape=(mesh.n_vertices,) * 2)
     return (sp.diags_array(diagonal.astype(complex)) + half + half.conj().T).tocsr()
 
 

@@ -9,7 +9,7 @@ from certeig.kit.arrays import positive_values
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike
 from eigenshape._corners import in_length
-from eigenshape._vectors import scale_to_unit
+from eigenshape._vectors import row_dots, scale_to_unit
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
 from eigenshape.geometry.measure import vertex_normals
 from eigenshape.geometry.mesh import TriangleMesh
@@ -146,4 +146,4 @@ def mean_curvature(mesh: MeshLike) -> Float[np.ndarray, " n"]:
     points, scale = scale_to_unit(mesh.vertices)
     operator = cotangent_laplacian(TriangleMesh(points, mesh.faces))
     pull = (operator.stiffness @ points) / operator.mass.diagonal()[:, None]
-    return in_length(np.einsum("ij,ij->i", pull, vertex_normals(mesh)) / 2, scale, -1)
+    return in_length(row_dots(pull, vertex_normals(mesh)) / 2, scale, -1)

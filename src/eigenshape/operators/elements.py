@@ -68,9 +68,10 @@ def _assemble(
 ) -> sp.csr_array:
     """Sum up the entries off the diagonal: each pair is summed once, then mirrored."""
     i, j = np.triu_indices(nodes.shape[1], 1)
-    ends = (nodes[:, i].ravel(), nodes[:, j].ravel())
+    short = nodes.astype(np.int32)  # as long as indices of SciPy need be
+    ends = (short[:, i].ravel(), short[:, j].ravel())
     n = int(nodes.max()) + 1
-    half = sp.coo_array((local[:, i, j].ravel(), ends), shape=(n, n)).tocsr()
+    half = sp.csr_array((local[:, i, j].ravel(), ends), shape=(n, n))
     return (half + half.T).tocsr()
 
 

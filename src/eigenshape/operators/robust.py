@@ -111,7 +111,7 @@ def robust_laplacian(
     twins = delaunay.twins[once]
     weights = np.maximum(cotangents[once] + cotangents[twins], 0.0) / 4
     ends = (delaunay.tails[once], delaunay.tails[twins])
-    half = sp.coo_array((weights, ends), shape=(n, n)).tocsr()
+    half = sp.csr_array((weights, ends), shape=(n, n))
     whole = (half + half.T).tocsr()
     whole.eliminate_zeros()
     # An edge from a vertex to itself cancels here.

@@ -9,7 +9,7 @@ from certeig.kit.threads import one_blas_thread
 from certeig.sparse.symmetric_factor import SymmetricFactor
 from eigenshape._corners import mean_normals
 from eigenshape._errors import InvalidShapeError
-from eigenshape._vectors import size_one
+from eigenshape._vectors import row_dots, size_one
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.face_turns import orient_consistently
 from eigenshape.geometry.facets import boundary_facets
@@ -61,7 +61,7 @@ def noise_level(mesh: MeshLike) -> float:
         return 0.0
     away = links[inside] @ points / degrees[inside, None] - points[inside]
     normals = mean_normals(orient_consistently(unit))[inside]  # which side is out does not matter
-    heights = np.abs(np.einsum("ni,ni->n", away, normals))
+    heights = np.abs(row_dots(away, normals))
     return float(np.median(heights) / edge_lengths(unit).mean())
 
 

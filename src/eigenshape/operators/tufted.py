@@ -6,7 +6,7 @@ from jaxtyping import Float, Int
 from certeig.kit.arrays import record
 from certeig.kit.errors import ConvergenceError
 from eigenshape._corners import edge_keys, side_ends
-from eigenshape._vectors import unit_vectors
+from eigenshape._vectors import row_dots, unit_vectors
 from eigenshape.operators import flip_loops
 
 # a pair of cotangents that sums to less below zero is cocircular, relative to the terms in it
@@ -90,14 +90,14 @@ def tufted_cover(
         low, high = np.minimum(tail, head), np.maximum(tail, head)
         along = unit_vectors(points[high] - points[low])
         out = points[apex] - points[low]
-        out -= np.einsum("ij,ij->i", out, along)[:, None] * along
+        out -= row_dots(out, along)[:, None] * along
         # Angles start from the face whose apex is farthest from the edge, which rounding has blurred
         # least.
         best = np.lexsort((sides, -np.linalg.norm(out, axis=1), crowd))
         groups, inverse = np.unique(crowd, return_inverse=True)
         zero = out[best[np.searchsorted(crowd[best], groups)]][inverse]
         quarter = np.cross(along, zero)
-        angles = np.arctan2(np.einsum("ij,ij->i", out, quarter), np.einsum("ij,ij->i", out, zero))
+        angles = np.arctan2(row_dots(out, quarter), row_dots(out, zero))
         # Faces with the same corners lie in one order seen from any of their sides: seen against it,
         # from the last.
         between = (low < apex) & (apex < high)

@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from certeig.kit.arrays import record
-from eigenshape.scans.raster_loops import fill_buffer
+from eigenshape.scans.raster_loops import fill_buffer, fill_depth
 
 # Twice the area, in square pixels, up to which a face is seen from its edge and covers no pixel.
 LEAST_DOUBLED_AREA = 1e-12
@@ -63,3 +63,17 @@ class Raster:
         places = np.ascontiguousarray(points, dtype=np.float64)
         fill_buffer(places, corners, LEAST_DOUBLED_AREA, EDGE_SLACK, face, weights, depth)
         return cls(face, weights, depth)
+
+
+def depths_at(
+    points: Float[np.ndarray, "n 3"],
+    faces: Int[np.ndarray, "f 3"],
+    pixels: Int[np.ndarray, "p 2"],
+    size: int,
+) -> Float[np.ndarray, " p"]:
+    """Return the `depth` of a square `Raster` at some pixels, each a column and a row."""
+    column, row = pixels.T
+    depth = np.full((size, size), np.inf)
+    depth[row, column] = -np.inf
+    fill_depth(points, faces, LEAST_DOUBLED_AREA, EDGE_SLACK, depth)
+    return depth[row, column]

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from eigenshape._corners import cut_tetrahedra
 from eigenshape._errors import InvalidShapeError
-from eigenshape._vectors import area_vectors, size_one, triangle_areas
+from eigenshape._vectors import area_vectors, row_dots, size_one, triangle_areas
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair_report import RepairedMesh
@@ -96,7 +96,7 @@ def reconstruct_surface(
     distance, nearest = cKDTree(places).query(corners.mean(axis=1))
     # A camera sees few points on a face that turns away from it: far is what is far for them.
     reach = SUPPORT * np.clip((np.sqrt(areas) / cell)[nearest], 1, REACH)
-    bare = (np.einsum("fi,fi->f", facing, normals[nearest]) < 0) | (distance > reach)
+    bare = (row_dots(facing, normals[nearest]) < 0) | (distance > reach)
     if bare.any():
         # Single points decide where the boundary runs, so it is ragged: averages of what faces say over
         # their neighbors move it as mean curvature does (Merriman, Bence and Osher, 1992).
@@ -146,7 +146,7 @@ def _oriented_normals(
     n, k = neighbors.shape
     one, two = np.repeat(np.arange(n), k), neighbors.ravel()
     places = one.astype(np.int32), two.astype(np.int32)  # as SciPy 1.15 needs them for the forest
-    bend = 1 - np.abs(np.einsum("ni,ni->n", normals[one], normals[two]))
+    bend = 1 - np.abs(row_dots(normals[one], normals[two]))
     # A stored weight of zero would be no edge.
     graph = sp.csr_array((bend + 1e-3, places), shape=(n, n))
     forest = csgraph.minimum_spanning_tree(graph.maximum(graph.T))
@@ -188,7 +188,7 @@ def _level_set(
     square[0, 0, 0] = 1
     divergence = np.zeros(square.shape, dtype=complex)
     for axis, wave in enumerate(waves):
-        total = np.zeros(np.prod(counts))
+        total = np.zeros(int(np.prod(counts)))
         for corner, share in zip(corners, shares, strict=True):
             total += np.bincount(corner, share * slopes[:, axis], len(total))
         divergence += wave * fft.rfftn(total.reshape(counts))
@@ -215,7 +215,7 @@ def _level_set(
     )
     vertices = start + share * (end - start)
     outward = (end - start)[faces].sum(axis=1)
-    turned = np.einsum("fi,fi->f", area_vectors(vertices[faces]), outward) < 0
+    turned = row_dots(area_vectors(vertices[faces]), outward) < 0
     return TriangleMesh(vertices, np.where(turned[:, None], faces[:, ::-1], faces))
 
 

@@ -9,7 +9,8 @@ from jaxtyping import Float
 from scipy.optimize import brentq
 from scipy.special import comb, eval_legendre, jn_zeros, jnp_zeros, spherical_jn
 
-from certeig.kit.arrays import positive_values, real_numbers, whole_number
+from certeig.kit.arguments import require_choice
+from certeig.kit.arrays import positive_number, positive_values, real_numbers, whole_number
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike, Integer
@@ -110,7 +111,7 @@ def sphere_functional_eigenvalues(k: Integer, t: float) -> Float[np.ndarray, " k
     >>> es.shapes.sphere_functional_eigenvalues(4, 0.01).round(4).tolist()
     [0.0, 2.0, 2.0, 2.0]
     """
-    count, time = whole_number(k, "k", 1, MOST_HARMONICS), float(positive_values(t, "t")[0])
+    count, time = whole_number(k, "k", 1, MOST_HARMONICS), positive_number(t, "t")
     nodes, weights = np.polynomial.legendre.leggauss(N_GAUSS_NODES)
     reach = min(1 / time, NEGLIGIBLE_EXPONENT) / 2
     u = reach * (nodes + 1)
@@ -194,7 +195,8 @@ def box_eigenvalues(
     """
     count = _eigenvalue_number(k)
     lengths = positive_values(list(sides), "sides")
-    first = int(_require_condition(condition) == "dirichlet")
+    require_choice(condition, Condition, "condition")
+    first = int(condition == "dirichlet")
     frequencies = [(np.arange(first, first + count) / length) ** 2 for length in lengths]
     sums = frequencies[0]
     for others in frequencies[1:]:
@@ -286,7 +288,8 @@ def disc_eigenvalues(k: Integer, condition: Condition = "neumann") -> Float[np.n
     [5.7832, 14.682, 14.682]
     """
     count = whole_number(k, "k", 1, 10_000)
-    zeros = jn_zeros if _require_condition(condition) == "dirichlet" else jnp_zeros
+    require_choice(condition, Condition, "condition")
+    zeros = jn_zeros if condition == "dirichlet" else jnp_zeros
     # More zeros of each order than can be among the first `count` eigenvalues.
     radial = int(count**0.5) + 4
     return _lowest_squares(
@@ -331,7 +334,8 @@ def ball_eigenvalues(k: Integer, condition: Condition = "neumann") -> Float[np.n
     [9.8696, 20.1907]
     """
     count = whole_number(k, "k", 1, 2_000)
-    derivative = _require_condition(condition) == "neumann"
+    require_choice(condition, Condition, "condition")
+    derivative = condition == "neumann"
     return _lowest_squares(
         count,
         condition,
@@ -369,14 +373,6 @@ def _zeros(function: Callable[[float], float], start: int, count: int) -> Float[
     return np.array(
         [brentq(function, grid[place], grid[place + 1], xtol=1e-14) for place in changes]
     )
-
-
-def _require_condition(condition: str) -> str:
-    if condition not in ("neumann", "dirichlet"):
-        raise InvalidParameterError(
-            f"condition must be 'neumann' or 'dirichlet'; it is {condition!r}."
-        )
-    return condition
 
 
 def _eigenvalue_number(k: Integer) -> int:

@@ -5,12 +5,15 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Float, Int
 
+from certeig.kit.arrays import TINY
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import row_dots, sum_rows
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import is_closed, is_manifold, vertex_components
 from eigenshape.operators.graph import edge_graph
 
-Field = Callable[[Float[np.ndarray, "p 3"]], Float[np.ndarray, " p"]]
+Points = Float[np.ndarray, "p 3"]
+Field = Callable[[Points], Float[np.ndarray, " p"]]
 
 # The quads are split into triangles N_STAGES times anew, with N_ROUNDS of smoothing along the
 # surface before each. More of either makes triangles a little more even and takes longer.
@@ -78,7 +81,7 @@ def _is_sound(mesh: TriangleMesh) -> bool:
 
 def _nets(
     field: Field, low: Float[np.ndarray, "3"], high: Float[np.ndarray, "3"], spacing: float
-) -> tuple[Float[np.ndarray, "p 3"], Int[np.ndarray, "q 4"]]:
+) -> tuple[Points, Int[np.ndarray, "q 4"]]:
     # Evaluate the field at the points of a lattice near its surface. In a block far from the surface
     # all points get the value at the middle of the block.
     blocks = tuple(-(-np.ceil((high - low) / spacing).astype(int) // BLOCK))
@@ -103,7 +106,7 @@ def _nets(
     return low + spacing * points, quads
 
 
-def _in_chunks(field: Field, points: Float[np.ndarray, "p 3"]) -> Float[np.ndarray, " p"]:
+def _in_chunks(field: Field, points: Points) -> Float[np.ndarray, " p"]:
     return np.concatenate(
         [
             field(points[start : start + POINTS_AT_ONCE])
@@ -142,7 +145,7 @@ FACES = [_face(normal, side) for normal in range(3) for side in (0, 1)]
 
 def _sheet_points(
     cells: Int[np.ndarray, "c 3"], corners: Float[np.ndarray, "c 8"]
-) -> tuple[Int[np.ndarray, "c 12"], Float[np.ndarray, "p 3"]]:
+) -> tuple[Int[np.ndarray, "c 12"], Points]:
     """Place a point on each sheet of the surface in each cell.
 
     The point is the mean of the crossings of the sheet with the edges of the cell. Returns the
@@ -170,10 +173,7 @@ def _sheet_points(
                     sheet[linked, edges[one]] = sheet[linked, edges[two]] = least[linked]
     sheets = 12 * np.arange(len(cells))[:, None] + sheet
     _, number = np.unique(sheets[crosses], return_inverse=True)
-    counts = np.bincount(number)
-    points = np.column_stack(
-        [np.bincount(number, places[crosses][:, axis]) / counts for axis in range(3)]
-    )
+    points = sum_rows(number, places[crosses]) / np.bincount(number)[:, None]
     of_edge = np.full(crosses.shape, -1, dtype=np.int64)
     of_edge[crosses] = number
     return of_edge, points
@@ -204,9 +204,7 @@ def _quads(
     return np.where(leaves[:, None], quads, quads[:, ::-1])
 
 
-def _split(
-    points: Float[np.ndarray, "p 3"], quads: Int[np.ndarray, "q 4"]
-) -> Int[np.ndarray, "f 3"]:
+def _split(points: Points, quads: Int[np.ndarray, "q 4"]) -> Int[np.ndarray, "f 3"]:
     """Split each quad along the diagonal with the smaller opposite angles (Delaunay)."""
     a, b, c, d = points[quads].transpose(1, 0, 2)
     other_diagonal = _cotangent(b, a, c) + _cotangent(d, a, c) < 0
@@ -219,7 +217,7 @@ def _cotangent(
 ) -> Float[np.ndarray, " q"]:
     one, two = one - apex, two - apex
     twice_area = np.linalg.norm(np.cross(one, two), axis=1)
-    return np.einsum("ij,ij->i", one, two) / np.maximum(twice_area, np.finfo(np.float64).tiny)
+    return row_dots(one, two) / np.maximum(twice_area, TINY)
 
 
 def relax(field: Field, mesh: TriangleMesh, spacing: float) -> TriangleMesh:
@@ -229,14 +227,12 @@ def relax(field: Field, mesh: TriangleMesh, spacing: float) -> TriangleMesh:
     points, normals = _project(field, mesh.vertices, spacing)
     for _ in range(N_ROUNDS):
         pull = links @ points / degree - points
-        pull -= np.einsum("ij,ij->i", pull, normals)[:, None] * normals
+        pull -= row_dots(pull, normals)[:, None] * normals
         points, normals = _project(field, points + SMOOTHING_STEP * pull, spacing)
     return TriangleMesh(points, mesh.faces)
 
 
-def _project(
-    field: Field, points: Float[np.ndarray, "p 3"], spacing: float
-) -> tuple[Float[np.ndarray, "p 3"], Float[np.ndarray, "p 3"]]:
+def _project(field: Field, points: Points, spacing: float) -> tuple[Points, Points]:
     """Move points towards the zero set by one Newton step; return the points and the normals.
 
     A step is at most half a cell long.

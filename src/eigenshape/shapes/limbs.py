@@ -7,6 +7,7 @@ from jaxtyping import Float, Int
 from scipy.interpolate import CubicHermiteSpline
 
 from certeig.kit.arrays import record
+from eigenshape._vectors import row_dots
 from eigenshape.shapes.creature_plans import Limb, Swing
 from eigenshape.shapes.limb_loops import nearest_pieces
 
@@ -172,7 +173,7 @@ def distance_to_limb(
     # The distance to the cross-section, a superellipsoid, to first order: the value of the norm
     # that defines it, minus the radius, divided by its slope.
     if limb.power == 2 and (limb.squash == 1).all():
-        apart[close] = np.sqrt(np.einsum("ij,ij->i", arm, arm)) - radius
+        apart[close] = np.sqrt(row_dots(arm, arm)) - radius
         return apart, place
     scaled = np.abs(arm) / limb.squash
     size = np.maximum((scaled**limb.power).sum(axis=1) ** (1 / limb.power), TINY_SIZE)

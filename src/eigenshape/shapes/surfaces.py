@@ -59,12 +59,12 @@ def _icosahedron() -> TriangleMesh:
     # The faces are the triangles of points that are nearest neighbors of each other.
     distance = np.linalg.norm(points[:, None] - points[None], axis=2)
     near = (distance < 1.01 * distance[distance > 0].min()) & (distance > 0)
-    outward = [
-        (a, b, c) if np.linalg.det(points[[a, b, c]]) > 0 else (a, c, b)
-        for a, b, c in combinations(range(len(points)), 3)
-        if near[a, b] and near[b, c] and near[a, c]
-    ]
-    return TriangleMesh(points, np.array(outward, dtype=np.int64))
+    triples = np.array(list(combinations(range(len(points)), 3)))
+    a, b, c = triples.T
+    faces = triples[near[a, b] & near[b, c] & near[a, c]]
+    inward = np.linalg.det(points[faces]) < 0
+    faces[inward] = faces[inward][:, [0, 2, 1]]
+    return TriangleMesh(points, faces)
 
 
 def torus(

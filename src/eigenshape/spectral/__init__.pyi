@@ -22,7 +22,6 @@ from .laws.outcomes import Law as Law
 from .laws.outcomes import OperatorReport as OperatorReport
 from .laws.outcomes import SkippedLaw as SkippedLaw
 from .maps.functional_map import FunctionalMap as FunctionalMap
-from .maps.functional_map import compose_maps as compose_maps
 from .maps.functional_map import transfer_function as transfer_function
 from .maps.latent_basis import LatentBasis as LatentBasis
 from .maps.latent_basis import difference_regions as difference_regions

@@ -15,6 +15,8 @@ from certeig.kit.errors import InvalidParameterError
 from eigenshape.operators.laplacian import GaussianKernel
 from eigenshape.spectral.certificate import Certificate
 
+Values = Float[np.ndarray, " k"]
+
 # t μ at t λ = 2.9, beyond which corrected eigenvalues cannot be distinguished: on a surface that is
 # the k-th eigenvalue of n = 5 k t/e² points.
 LAST_CORRECTED = 0.945
@@ -24,9 +26,7 @@ ESSENTIAL = 0.5
 BIASED = 0.181
 
 
-def to_pencil(
-    kernel: GaussianKernel | None, values: Float[np.ndarray, " k"]
-) -> Float[np.ndarray, " k"]:
+def to_pencil(kernel: GaussianKernel | None, values: Values) -> Values:
     """Return the eigenvalues μ of the pencil for reported ones."""
     return (
         -np.expm1(-kernel.t * values) / kernel.t
@@ -35,9 +35,7 @@ def to_pencil(
     )
 
 
-def require_readable(
-    kernel: GaussianKernel | None, values: Float[np.ndarray, " k"], *, stacklevel: int = 3
-) -> None:
+def require_readable(kernel: GaussianKernel | None, values: Values, *, stacklevel: int = 3) -> None:
     """Raise an error for corrected eigenvalues of 1/t or more, and warn of inaccurate ones.
 
     Raises an InvalidParameterError with the first eigenvalue that has no counterpart of Δ.
@@ -70,9 +68,7 @@ def require_readable(
         )
 
 
-def from_pencil(
-    kernel: GaussianKernel | None, values: Float[np.ndarray, " k"]
-) -> Float[np.ndarray, " k"]:
+def from_pencil(kernel: GaussianKernel | None, values: Values) -> Values:
     """Convert eigenvalues μ of the pencil to reported ones: λ if the kernel is corrected, otherwise μ."""
     return (
         -np.log1p(-kernel.t * values) / kernel.t
@@ -83,9 +79,9 @@ def from_pencil(
 
 def user_residuals(
     kernel: GaussianKernel | None,
-    values: Float[np.ndarray, " k"],
-    residuals: Float[np.ndarray, " k"],
-) -> Float[np.ndarray, " k"]:
+    values: Values,
+    residuals: Values,
+) -> Values:
     """Return the error intervals of reported eigenvalues from those of the pencil's."""
     if kernel is None or not kernel.corrected:
         return residuals

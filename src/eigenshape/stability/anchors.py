@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float, Int
 from scipy.spatial import cKDTree
 
 from certeig.kit.arguments import require_type
-from certeig.kit.arrays import ReadOnly, positive_values, record, whole_number
+from certeig.kit.arrays import ReadOnly, positive_number, positive_values, record, whole_number
 from certeig.kit.errors import InvalidParameterError
 from eigenshape._corners import longest_edges
 from eigenshape._vectors import size_one
@@ -137,7 +137,7 @@ def anchor_region(points: Points, nodes: Points, delta: float) -> Bool[np.ndarra
     array([ True,  True, False])
     """
     positive_values(delta, "delta")
-    return np.asarray(cKDTree(nodes).query(points)[0] <= delta)
+    return cKDTree(nodes).query(points)[0] <= delta
 
 
 def witness_region(
@@ -198,7 +198,7 @@ def witness_region(
     """
     require_type(perturbation, Perturbation, "perturbation")
     require_type(points, SurfacePoints, "points")
-    reach = (positive_values(rho, "rho")[0] + 1) * positive_values(delta, "delta")[0]
+    reach = (positive_number(rho, "rho") + 1) * positive_number(delta, "delta")
     labels, before = preimages(perturbation, points)
     inside = np.zeros(points.n_points, dtype=bool)
     inside[labels == OUTSIDE] = cKDTree(nodes).query(before)[0] <= reach

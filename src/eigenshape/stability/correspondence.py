@@ -6,7 +6,7 @@ from jaxtyping import Float, Int
 from scipy.spatial import cKDTree
 
 from certeig.kit.arguments import require_type
-from certeig.kit.arrays import ReadOnly, positive_values, record
+from certeig.kit.arrays import ReadOnly, positive_number, record
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike
 from eigenshape._arrays import finite_rows
@@ -114,7 +114,7 @@ def matching_reach(mu: float) -> float:
     >>> es.stability.matching_reach(2.0)
     6.0
     """
-    return max(3.0, 8 / float(positive_values(mu, "mu")[0]) + 2)
+    return max(3.0, 8 / positive_number(mu, "mu") + 2)
 
 
 def correspondence_graph(
@@ -179,7 +179,7 @@ def correspondence_graph(
     require_type(perturbation, Perturbation, "perturbation")
     require_type(points_one, SurfacePoints, "points_one")
     require_type(points_two, SurfacePoints, "points_two")
-    reach = float((positive_values(rho, "rho")[0] + 1) * positive_values(delta, "delta")[0])
+    reach = (positive_number(rho, "rho") + 1) * positive_number(delta, "delta")
     used, node = np.unique(cKDTree(nodes).query(points_one.points)[1], return_inverse=True)
     nodes = nodes[used]
     # The points of N in the witness region of each node, as rows of a matrix.

@@ -211,7 +211,7 @@ def _check_labels(regions: ArrayLike | None, mesh: Mesh, name: str) -> Labels:
     n = len(mesh.simplices)
     if regions is None:
         return np.full(n, OUTSIDE)
-    labels = face_labels(regions, name, n).astype(np.int64)
+    labels = face_labels(regions, name, mesh).astype(np.int64)
     wrong = np.flatnonzero((labels < OUTSIDE) | (labels >= n))
     if wrong.size:
         raise InvalidParameterError(

@@ -137,8 +137,8 @@ class StabilityReport(ReadOnly):
         if not self.closeness and self.times.low_reason == "closeness":
             lines.append(
                 "Points were matched by their places in space, which says little about one shape "
-                "in two poses. Pass partners, the map between the vertices, or compare eigenvalues "
-                "only."
+                "in two poses or places. Pass the map between the vertices (`partners`, or --map on the "
+                "command line), or compare eigenvalues only."
             )
         return "\n\n".join(lines)
 

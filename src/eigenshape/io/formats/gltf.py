@@ -342,8 +342,7 @@ def turn_back(faces: np.ndarray, signs: np.ndarray) -> np.ndarray:
 
 def sides(matrices: np.ndarray) -> np.ndarray:
     """Return -1 for matrices that turn triangles over, and 1 for others, however small."""
-    signs: np.ndarray = np.linalg.slogdet(matrices[:, :3, :3])[0]
-    return signs
+    return np.linalg.slogdet(matrices[:, :3, :3])[0]
 
 
 def _merge_pieces(pieces: Sequence[Piece]) -> Piece:

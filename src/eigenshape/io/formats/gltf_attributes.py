@@ -163,7 +163,7 @@ def _upward_coordinates(rows: np.ndarray, transform: Entry) -> np.ndarray:
     angle = transform.get("rotation", 0.0)
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     scaled = rows * transform.get("scale", [1.0, 1.0])
-    moved: np.ndarray = scaled @ turn + transform.get("offset", [0.0, 0.0])
+    moved = scaled @ turn + transform.get("offset", [0.0, 0.0])
     return moved * [1, -1] + [0, 1]
 
 

@@ -102,8 +102,7 @@ def fit_scene(
 
         def average(values: np.ndarray) -> np.ndarray:
             sums = solve_heat(laplacian, np.column_stack([share * values, share]), time)
-            means: np.ndarray = sums[:, :-1] / sums[:, -1:]
-            return means
+            return sums[:, :-1] / sums[:, -1:]
 
         around = fit_similarities(average, places.vertices, mesh.vertices)
         usual = float(np.median(around.factors))

@@ -12,7 +12,7 @@ from jaxtyping import Float, Int
 
 from certeig.kit.errors import FileFormatError
 from certeig.kit.files import read_regular
-from eigenshape._vectors import area_vectors, unit_vectors
+from eigenshape._vectors import area_vectors, sum_rows, unit_vectors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.polygons import cut_polygons
 from eigenshape.io.attributes import Material, MeshAttributes, WriteJob, corner_normals
@@ -324,8 +324,8 @@ def _normals(
     if not numbers:
         return np.empty((0, 3)), numbers
     vectors = area_vectors(vertices[np.array(triangles)])
-    sums = np.column_stack([np.bincount(owners, weights=column) for column in vectors.T])
-    units, old = unit_vectors(sums), np.array([normal for _, normal in numbers])
+    units = unit_vectors(sum_rows(np.array(owners), vectors))
+    old = np.array([normal for _, normal in numbers])
     return np.where(units.any(axis=1, keepdims=True), units, old), numbers
 
 

@@ -33,8 +33,8 @@ def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], np.ndarray, *tuple[str
             "es.morphometrics.read_landmarks reads them."
         )
     lines = lines_of(data)
-    if lines and len(lines[0][1].split()) == 1:
-        declared = whole(lines[0][1], lines[0], "A number of points")
+    if lines and lines[0][1].isdigit():
+        declared = int(lines[0][1])
         lines = lines[1:]
         if declared != len(lines):
             raise FileFormatError(
@@ -44,7 +44,12 @@ def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], np.ndarray, *tuple[str
         raise FileFormatError("A file of points must hold points; it holds none.")
     more = len(lines[0][1].split()) - 3
     notes = [f"{more} columns after x, y and z are not read"] if more > 0 else []
-    return coordinates(lines), NO_TRIANGLES, *notes
+    try:
+        return coordinates(lines), NO_TRIANGLES, *notes
+    except FileFormatError as err:
+        raise FileFormatError(
+            f"{err} Put # before lines of text, spaces between numbers, and a point before decimals."
+        ) from err
 
 
 def _parse_binary(data: bytes) -> Float[np.ndarray, "n 3"]:

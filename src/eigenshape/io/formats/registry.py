@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any, Literal
 
 from certeig.kit.errors import FileFormatError
-from certeig.kit.files import require_regular
 
 CellKind = Literal["triangles", "quads", "tetrahedra"]
 """The kinds of cells that can be requested from a file."""
@@ -138,6 +137,9 @@ GZ = ".gz"  # after the suffix of any format: the file is unpacked when it is re
 OTHER_VTK = (".vti", ".vtr", ".vts", ".vtm", ".vtmb", ".pvtu", ".pvtp", ".vtkhdf")
 VTK_REMEDY = ' In PyVista, pyvista.read(path).extract_surface().save("a.vtp") writes the surface.'
 
+TABLES = (".txt", ".csv", ".asc", ".dat")
+TABLE_REMEDY = " Points, x y z on each line, are read from a file whose name ends in .xyz."
+
 
 def suffixes_with(*traits: Trait) -> tuple[str, ...]:
     """Return the suffixes of the formats that have one of some traits."""
@@ -222,13 +224,16 @@ def suffix_of(path: Path, file_format: str | None, known: tuple[str, ...]) -> st
             suffix = written[0] if written else suffix
     if suffix not in known:
         if path.is_dir():
-            require_regular(path)
+            inside = sorted(each for each in path.iterdir() if suffix_in(each.name) in known)
+            example = f", such as {inside[0]}" if inside else ""
+            raise FileFormatError(f"{path} must be a file; it is a folder. Name a file{example}.")
         found = f"is {suffix!r}" if suffix else "has no suffix"
         remedies = {
             VOLUME_FORMATS: " es.io.read_volume reads the volume in it.",
             MAP_FORMATS: " es.io.read_fields reads the functions in it.",
             PARCEL_FORMATS: " es.io.read_parcellation reads the parcels in it.",
             OTHER_VTK: VTK_REMEDY,
+            TABLES: TABLE_REMEDY if ".xyz" in known else "",
         }
         remedy = "".join(text for kind, text in remedies.items() if suffix in kind)
         raise FileFormatError(

@@ -96,8 +96,7 @@ class _Packing:
         n_head = self.size.itemsize
 
         def counts(number: int) -> list[int]:
-            found: list[int] = np.frombuffer(first(text, number * n_head), self.size).tolist()
-            return found
+            return np.frombuffer(first(text, number * n_head), self.size).tolist()
 
         def first(text: bytes, length: int) -> bytes:
             """Return the first bytes that a text holds, raw or in base64."""

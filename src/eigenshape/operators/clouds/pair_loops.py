@@ -12,6 +12,8 @@ from jaxtyping import Bool, Float64, Int, Int32, Int64
 
 from certeig.kit.kernels import Out, kernel
 
+Numbers = Int64[np.ndarray, " n"]
+
 Cells: TypeAlias = tuple[
     Float64[np.ndarray, "n dim"],
     Int64[np.ndarray, "n_cells+1"],
@@ -22,10 +24,10 @@ Cells: TypeAlias = tuple[
 @kernel("dim", "n_runs")
 def count_pairs(
     cells: Cells,
-    order: Int64[np.ndarray, " n"],
+    order: Numbers,
     farthest: float,
     wanted: Bool[np.ndarray, " n"],
-    counts: Out[Int64[np.ndarray, " n"]],
+    counts: Out[Numbers],
     begin: int,
     end: int,
 ) -> None:
@@ -35,8 +37,8 @@ def count_pairs(
 @kernel("dim", "n_runs")
 def fill_pairs(
     cells: Cells,
-    order: Int64[np.ndarray, " n"],
-    place: Int64[np.ndarray, " n"],
+    order: Numbers,
+    place: Numbers,
     farthest: float,
     rate: float,
     libm: tuple[int],
@@ -71,9 +73,7 @@ def sum_differences(
     """Fill the sums of weighted differences to all partners, for the points of some cells."""
 
 
-def component_labels(
-    starts: Int[np.ndarray, " n1"], columns: Int[np.ndarray, " k"]
-) -> Int64[np.ndarray, " n"]:
+def component_labels(starts: Int[np.ndarray, " n1"], columns: Int[np.ndarray, " k"]) -> Numbers:
     """Return the connected component of each row; components are numbered by their first rows."""
     labels, stack = np.empty((2, len(starts) - 1), dtype=np.int64)
     links = np.asarray(starts, dtype=np.int64), np.asarray(columns, dtype=np.int32)
@@ -85,8 +85,8 @@ def component_labels(
 def fill_labels(
     starts: Int64[np.ndarray, "n+1"],
     columns: Int32[np.ndarray, " _"],
-    labels: Out[Int64[np.ndarray, " n"]],
-    stack: Out[Int64[np.ndarray, " n"]],
+    labels: Out[Numbers],
+    stack: Out[Numbers],
 ) -> None:
     """Fill the result of `component_labels`; `stack` is scratch."""
 
@@ -96,7 +96,7 @@ def local_rings(
     x: Float64[np.ndarray, "n_points n"],
     y: Float64[np.ndarray, "n_points n"],
     rings: Out[Int64[np.ndarray, "n_points n"]],
-    order: Out[Int64[np.ndarray, " n"]],
+    order: Out[Numbers],
     hull: Out[Int64[np.ndarray, " 2*n+2"]],
 ) -> None:
     """Write the convex hull of each row of points by Andrew's monotone chain (1979), then -1.

@@ -74,7 +74,8 @@ class EigenspaceAngles(ReadOnly):
         if not len(self.angles):
             return "No group of eigenvalues is known completely."
         worst = int(self.angles.argmax())
-        numbers = f"numbers {self.starts[worst]} to {self.stops[worst] - 1}"
+        start, last = self.starts[worst], self.stops[worst] - 1
+        numbers = f"number {start}" if start == last else f"numbers {start} to {last}"
         degrees = np.degrees([np.median(self.angles), self.angles[worst]])
         summary = (
             f"The eigenspaces of {len(self.angles)} groups turn by {degrees[0]:.3g}° in the median and by at most "

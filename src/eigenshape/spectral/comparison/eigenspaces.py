@@ -7,7 +7,7 @@ import scipy.linalg as sl
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from certeig.kit.arrays import finite_values, whole_numbers
+from certeig.kit.arrays import TINY, finite_values, whole_numbers
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike
@@ -181,8 +181,8 @@ def orthonormal(
 
     Raises an InvalidParameterError if the columns are dependent.
     """
-    basis = columns / np.abs(columns).max(axis=0).clip(np.finfo(np.float64).tiny)
-    basis = basis / norms(basis, mass).clip(np.finfo(np.float64).tiny)
+    basis = columns / np.abs(columns).max(axis=0).clip(TINY)
+    basis = basis / norms(basis, mass).clip(TINY)
     least = float(np.linalg.eigvalsh(basis.T @ (mass @ basis))[0])
     if least < DEPENDENT_FUNCTIONS:
         raise InvalidParameterError(

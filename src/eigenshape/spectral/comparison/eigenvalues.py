@@ -202,35 +202,22 @@ def known_eigenvalues(
     intervals = np.empty((0, 2))
     if isinstance(spectrum, Spectrum):
         require_lowest(spectrum, name)
-        values = spectrum.eigenvalues[:k]
-        intervals = within_residuals(spectrum, len(values))
-        zero = intervals[:, 0] <= 0
+        values, residuals = spectrum.eigenvalues[:k], spectrum.residuals[:k]
+        # From 0 on where a value is 0 to rounding
+        lower = np.where(count_as_zero(values), 0.0, np.maximum(values - residuals, 0.0))
+        intervals, zero = np.column_stack([lower, values + residuals]), lower <= 0
     else:
         values = finite_values(spectrum, name)
         zero = count_as_zero(values)
     if brackets is not None:
-        intervals = within_brackets(brackets, len(values), name)
+        n = len(values)
+        if len(brackets.upper) < n:
+            raise InvalidParameterError(
+                f"There must be a bracket for each eigenvalue that is compared; there are {n} eigenvalues, and "
+                f"{len(brackets.upper)} brackets of {name}."
+            )
+        intervals = np.column_stack([brackets.lower[:n], brackets.upper[:n]])
     return KnownEigenvalues(values, zero, intervals, brackets is not None)
-
-
-def within_residuals(spectrum: Spectrum, k: int) -> Float[np.ndarray, "k 2"]:
-    """Return [λ - r, λ + r], from 0 on where λ is 0 to rounding."""
-    values, residuals = spectrum.eigenvalues[:k], spectrum.residuals[:k]
-    lower = np.where(count_as_zero(values), 0.0, np.maximum(values - residuals, 0.0))
-    return np.column_stack([lower, values + residuals])
-
-
-def within_brackets(brackets: Brackets, k: int, name: str) -> Float[np.ndarray, "k 2"]:
-    """Return the lowest k brackets.
-
-    Raises an InvalidParameterError if there are fewer.
-    """
-    if len(brackets.upper) < k:
-        raise InvalidParameterError(
-            f"There must be a bracket for each eigenvalue that is compared; there are {k} eigenvalues, and "
-            f"{len(brackets.upper)} brackets of {name}."
-        )
-    return np.column_stack([brackets.lower[:k], brackets.upper[:k]])
 
 
 def count_as_zero(values: Float[np.ndarray, " k"]) -> Bool[np.ndarray, " k"]:

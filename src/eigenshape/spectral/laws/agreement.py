@@ -4,7 +4,7 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from certeig.kit.arrays import EPS
+from certeig.kit.arrays import EPS, TINY
 from certeig.kit.errors import ConvergenceError
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.laws.outcomes import Law, Outcome, SkippedLaw, make_law
@@ -40,7 +40,7 @@ def distance(expected: Laplacian, found: Laplacian) -> tuple[float, str]:
     largest, explanation = 0.0, "no entry of W changes"
     for name, before, after in zip("WB", matrices(expected), matrices(found), strict=True):
         change, roots = (after - before).tocoo(), sizes_of(before)
-        scales = np.maximum(roots[change.row] * roots[change.col], np.finfo(float).tiny)
+        scales = np.maximum(roots[change.row] * roots[change.col], TINY)
         relative = np.abs(change.data) / scales
         if relative.max(initial=0.0) > largest:
             worst = int(relative.argmax())

@@ -8,6 +8,7 @@ from jaxtyping import Int
 from scipy.sparse.csgraph import connected_components
 
 from certeig.kit.arguments import require_type
+from certeig.kit.arrays import TINY
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.matrices import ASYMMETRY
 from certeig.kit.threads import one_blas_thread
@@ -187,7 +188,7 @@ def _row_sums(laplacian: Laplacian) -> Law:
     rows = np.repeat(np.arange(W.shape[0]), np.diff(W.indptr))
     largest = roots.copy()
     np.maximum.at(largest, rows, roots[W.indices])
-    relative = np.abs(sums) / np.maximum(roots * largest, np.finfo(float).tiny)
+    relative = np.abs(sums) / np.maximum(roots * largest, TINY)
     worst = int(relative.argmax())
     explanation = (
         f"the largest sum of a row is that of row {worst}, {sums[worst]:.3g} where W_ii is "
@@ -206,9 +207,7 @@ def _kernel(laplacian: Laplacian, pencil: Pencil) -> Law:
     n_parts, labels = _graph_parts(laplacian.stiffness)
     energies = np.abs(np.bincount(labels, weights=pencil.stiffness.sum(axis=1)))
     masses = np.bincount(labels, weights=pencil.mass.sum(axis=1))
-    energy = (
-        float((energies / np.maximum(np.abs(masses), np.finfo(float).tiny)).max()) / pencil.level
-    )
+    energy = float((energies / np.maximum(np.abs(masses), TINY)).max()) / pencil.level
     line = min(max(FIRST_LINE, 4 * energy), LARGEST_ZERO)
     while True:
         below, negative = _count(pencil, line), _count(pencil, -line)

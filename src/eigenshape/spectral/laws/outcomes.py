@@ -1,6 +1,6 @@
 """Reports on the laws of a Laplace operator: which are promised, what was measured, which hold."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, TypeAlias, get_args
 
@@ -160,9 +160,3 @@ def check_promises(promises: Iterable[Promise]) -> frozenset[Promise]:
             f"promises must be among {', '.join(names)}; {unknown[0]!r} is not."
         )
     return given
-
-
-def all_outcomes(report: OperatorReport) -> Iterator[Law | SkippedLaw]:
-    """Return what was judged, then what was not."""
-    yield from report.laws
-    yield from report.skipped

@@ -52,6 +52,11 @@ class FunctionalMap(ReadOnly):
     >>> mapping = es.spectral.FunctionalMap(eye(5), spectrum, spectrum)
     >>> es.spectral.point_map(mapping).shape
     (288,)
+
+    Maps are composed as matrices are, the first one on the right:
+
+    >>> (mapping @ mapping).matrix.shape
+    (5, 5)
     """
 
     matrix: Float[np.ndarray, "k2 k1"]
@@ -75,6 +80,23 @@ class FunctionalMap(ReadOnly):
                 f"The matrix of a map must be finite; entry {bad[0].tolist()} is not."
             )
         vars(self).update(matrix=freeze(self.matrix))
+
+    @one_blas_thread()
+    def __matmul__(self, first: object) -> "FunctionalMap":
+        """Return the map from the source of `first` to our target, in the modes that both maps have.
+
+        Raises an InvalidParameterError if the target of `first` is not our source.
+        """
+        if not isinstance(first, FunctionalMap):
+            return NotImplemented
+        k = min(first.matrix.shape[0], self.matrix.shape[1])
+        one, other = (spectrum.eigenvectors[:, :k] for spectrum in (first.target, self.source))
+        if not np.array_equal(one, other):
+            raise InvalidParameterError(
+                f"The target of the map on the right must be the source of the one on the left; their modes differ, on "
+                f"{len(one)} and {len(other)} points."
+            )
+        return FunctionalMap(self.matrix[:, :k] @ first.matrix[:k], first.source, self.target)
 
 
 def require_one_constant(spectrum: Spectrum, name: str) -> None:
@@ -165,42 +187,3 @@ def transfer_function(mapping: FunctionalMap, values: ArrayLike) -> Float[np.nda
     k2, k1 = mapping.matrix.shape
     coefficients = mapping.matrix @ (unit_projector(mapping.source, k1).T @ functions)
     return unit_modes(mapping.target, k2) @ coefficients
-
-
-@one_blas_thread()
-def compose_maps(first: FunctionalMap, second: FunctionalMap) -> FunctionalMap:
-    """Compose two functional maps, in the modes that both have of the shape between them.
-
-    Parameters
-    ----------
-    first, second : FunctionalMap
-        The target of `first` must be the source of `second`.
-
-    Returns
-    -------
-    FunctionalMap
-        From the source of `first` to the target of `second`.
-
-    Raises
-    ------
-    InvalidParameterError
-        If the target of `first` differs from the source of `second`.
-
-    Examples
-    --------
-    >>> import eigenshape as es
-    >>> spectrum = es.solve_spectrum(es.cotangent_laplacian(es.shapes.torus(24, 12)), 8)
-    >>> one = es.functional_map(spectrum, spectrum, [[0, 0], [50, 50]], n_modes=6)
-    >>> es.spectral.compose_maps(one, one).matrix.shape
-    (6, 6)
-    """
-    require_type(first, FunctionalMap, "first")
-    require_type(second, FunctionalMap, "second")
-    k = min(first.matrix.shape[0], second.matrix.shape[1])
-    one, other = (spectrum.eigenvectors[:, :k] for spectrum in (first.target, second.source))
-    if not np.array_equal(one, other):
-        raise InvalidParameterError(
-            f"The target of the first map must be the source of the second; their modes differ, on {len(one)} and "
-            f"{len(other)} points."
-        )
-    return FunctionalMap(second.matrix[:, :k] @ first.matrix[:k], first.source, second.target)

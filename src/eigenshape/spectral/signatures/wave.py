@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 from certeig.kit.arguments import require_type
-from certeig.kit.arrays import finite_values, positive_values, whole_number
+from certeig.kit.arrays import finite_values, positive_number, positive_values, whole_number
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike, Integer
 from eigenshape.spectral.signatures.heat import positive_eigenvalues
@@ -130,7 +130,7 @@ def wave_bands(
     """
     logs = np.log(positive_eigenvalues(spectrum))
     levels = finite_values(energies, "energies")
-    width = positive_values(sigma, "sigma")[0]
+    width = positive_number(sigma, "sigma")
     # Far from all eigenvalues every exponential is 0, so they are taken relative to the nearest one,
     # n: (e - log λ)² - (e - n)² = (log λ - n) (log λ + n - 2e), whose factors do not overflow.
     nearest = logs[np.searchsorted((logs[1:] + logs[:-1]) / 2, levels)]

@@ -8,10 +8,11 @@ from jaxtyping import Int
 from scipy.cluster.vq import vq
 
 from certeig.kit.arguments import require_choice, require_type
-from certeig.kit.arrays import as_array, whole_number
+from certeig.kit.arrays import TINY, as_array, whole_number
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike
+from eigenshape._vectors import sum_rows
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.operators.requirements import require_matrix
 from eigenshape.spectral.requirements import require_lowest
@@ -102,7 +103,7 @@ def spectral_clusters(
         return np.zeros(len(spectrum.eigenvectors), dtype=np.int64)
     modes = spectrum.eigenvectors[:, :n_clusters]
     lengths = np.linalg.norm(modes, axis=1)[:, None]
-    rows = modes / np.maximum(lengths, np.finfo(np.float64).tiny)
+    rows = modes / np.maximum(lengths, TINY)
     # Start from rows that are long and nearly orthogonal to each other.
     weighted = modes * np.sqrt(spectrum.mass.diagonal())[:, None]
     _, pivots = sl.qr(weighted.T, mode="r", pivoting=True)
@@ -115,9 +116,7 @@ def spectral_clusters(
         labels = vq(rows, centers)[0] if is_mean else np.argmax(rows @ centers.T, axis=1)
         if np.array_equal(before, labels):
             break
-        sums = np.stack(
-            [np.bincount(labels, column, minlength=len(centers)) for column in rows.T], axis=1
-        )
+        sums = sum_rows(labels, rows, len(centers))
         if is_mean:
             # Centers move to the mean of their rows; one that has lost all rows stays.
             counts = np.bincount(labels, minlength=len(centers))[:, None]
@@ -236,7 +235,6 @@ def normalized_cut(laplacian: Laplacian, labels: ArrayLike) -> float:
     >>> round(es.spectral.normalized_cut(laplacian, [0, 0, 1, 1]), 9)
     0.666666667
     """
-    require_type(laplacian, Laplacian, "laplacian")
     require_matrix(laplacian)
     names = as_array(labels, "labels")
     if names.shape != (laplacian.n_points,) or names.dtype.kind not in "biu":

@@ -4,8 +4,9 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
+from certeig.kit.arrays import TINY
 from eigenshape._corners import mean_normals
-from eigenshape._vectors import size_one
+from eigenshape._vectors import row_dots, size_one
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.operators.clouds.neighbors import nearest_others
@@ -76,17 +77,15 @@ def fit_gradient(
     scaled, scale = size_one(points)
     tails, heads = edges
     vectors = np.take(scaled, heads, axis=0) - np.take(scaled, tails, axis=0)
-    x, y = (
-        np.einsum("ei,ei->e", vectors, np.take(frames[:, axis], tails, axis=0)) for axis in (0, 1)
-    )
+    x, y = (row_dots(vectors, np.take(frames[:, axis], tails, axis=0)) for axis in (0, 1))
 
     # The inverse of each 2 x 2 matrix of normal equations, or its pseudoinverse if its rank is 1.
     n = len(points)
     xx, xy, yy = (np.bincount(tails, weights=w, minlength=n) for w in (x * x, x * y, y * y))
     determinant, trace = xx * yy - xy * xy, xx + yy
     regular = determinant > COLLINEAR * trace**2
-    divisor = np.where(regular, determinant, np.maximum(trace, np.finfo(float).tiny) ** 2)
-    divisor = np.maximum(divisor, np.finfo(float).tiny)
+    divisor = np.where(regular, determinant, np.maximum(trace, TINY) ** 2)
+    divisor = np.maximum(divisor, TINY)
     a = np.where(regular, yy, xx) / divisor
     b = np.where(regular, -xy, xy) / divisor
     c = np.where(regular, xx, yy) / divisor

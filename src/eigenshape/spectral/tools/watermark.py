@@ -15,7 +15,7 @@ from certeig.kit.errors import InvalidParameterError
 from certeig.kit.text import html_repr
 from certeig.kit.typing import Integer
 from eigenshape._errors import InvalidShapeError
-from eigenshape._vectors import size_one
+from eigenshape._vectors import rotations_and_stretches, size_one
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import vertex_components
@@ -243,10 +243,8 @@ def detect_watermark(
         raise InvalidShapeError(
             f"The suspect must have an extent; all of its vertices are at {middle.tolist()}."
         )
-    left, stretches, right = np.linalg.svd(wanted.T @ (shares * centered))
-    signs = np.array([1.0, 1.0, np.sign(np.linalg.det(left) * np.linalg.det(right))])
-    rotation = (left * signs) @ right
-    aligned = goal + (stretches @ signs) / spread * centered @ rotation.T
+    rotation, stretches = rotations_and_stretches(wanted.T @ (shares * centered))
+    aligned = goal + stretches.sum() / spread * centered @ rotation.T
     own = basis.T @ (mass[:, None] * points)
     difference = basis.T @ (mass[:, None] * (aligned - points))
     found, dimension = _across(difference, own, groups)

@@ -171,5 +171,4 @@ def format_maps(mesh: TriangleMesh, of_vertices: Arrays, suffix: str) -> bytes:
 def _write(rows: np.ndarray, maps: Any, models: Any, intent: str) -> bytes:
     image = require_nibabel("nibabel").Cifti2Image(rows, (maps, models))
     image.nifti_header.set_intent(intent)
-    written: bytes = image.to_bytes()
-    return written
+    return image.to_bytes()

@@ -267,5 +267,4 @@ def _format(
         for column in [values] if is_surface else values.reshape(len(values), -1).T:
             meta, numbers = gifti.GiftiMetaData(pairs), narrow(name, column)
             image.add_gifti_data_array(gifti.GiftiDataArray(numbers, intent=intent, meta=meta))
-    text: bytes = image.to_bytes()
-    return text
+    return image.to_bytes()
