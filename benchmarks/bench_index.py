@@ -58,6 +58,8 @@ def few_points() -> PatchPoints:
         points.weights[some],
         points.distances[some, some],
         points.vertices[some],
+        points.places[some],
+        points.normals[some],
     )
 
 

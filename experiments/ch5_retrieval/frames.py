@@ -63,7 +63,7 @@ def describe(version: Version) -> tuple[es.retrieval.PatchDescriptor, int]:
     """Return the descriptor of a version, with frames if it is closed, and the number of fused frames."""
     n_joined, mesh = 1, None
     if version.change == FUSED:
-        fused = es.matching.fuse_scans(five_frames(version))
+        fused = es.matching.fuse_scans(five_frames(version), bend=False)
         n_joined, mesh = int(fused.joined.sum()), fused.mesh
     patches = es.retrieval.extract_patches(mesh or make(version), n_frames=N_FRAMES)
     return es.retrieval.patch_descriptor(patches, es.retrieval.PatchRecipe()), n_joined
