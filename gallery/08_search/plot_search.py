@@ -31,13 +31,11 @@ for match in matches:
     )
 
 # %%
-# The scan beside its matches.
+# The scan beside its matches. What corresponds has one color.
 
-panels = [
-    es.plot.Panel(mesh, title, np.zeros(mesh.n_faces, dtype=int), np.empty(0, dtype=int))
-    for title, mesh in [
-        ("scan", scan),
-        *((f"{match.name}\nscore {match.score:.3f}", stored[match.name]) for match in matches),
-    ]
-]
-es.plot.figure_contact_sheet(panels[0], panels[1:], caption="a lower score is more alike")
+es.plot.figure_matches(scan, matches, meshes=stored, title="scan")
+
+# %%
+# The surest pairs of points of the best match, each with its surroundings.
+
+es.plot.figure_matches(scan, matches[0], meshes=stored, title="scan")
