@@ -1,6 +1,8 @@
-"""Draw the pictures of the README and of the site: a search, eigenfunctions, parts, and a bend that moves.
+"""Draw the pictures of the README and of the site: a search, eigenfunctions, parts, labels, a bend that moves.
 
     python docs/front_page.py docs/pictures
+
+`tests/house/test_front_page.py` draws them again, and compares.
 
 Synthetic shapes stand in for scans; `read_mesh("scan.ply")` takes their place with real files.
 """
@@ -16,7 +18,15 @@ from PIL import Image  # comes with matplotlib
 
 import eigenshape as es
 
-NAMES = ("sheet.png", "spectrum.png", "parts.png", "bend.png", "motion.webp")
+NAMES = (
+    "sheet.png",
+    "spectrum.png",
+    "parts.png",
+    "labels.png",
+    "transfer.png",
+    "bend.png",
+    "motion.webp",
+)
 N_FRAMES = 36  # of a loop of two seconds
 FRAME = 440  # pixels of a side
 
@@ -27,8 +37,10 @@ def main(folder: Path, *, n_vertices: int = 5000) -> list[Path]:
     draw_search(paths[0])
     draw_spectrum(paths[1], n_vertices)
     draw_parts(paths[2], n_vertices)
-    draw_bend(paths[3], n_vertices)
-    draw_motion(paths[4], n_vertices)
+    draw_labels(paths[3], n_vertices)
+    draw_transfer(paths[4], n_vertices)
+    draw_bend(paths[5], n_vertices)
+    draw_motion(paths[6], n_vertices)
     return paths
 
 
@@ -54,6 +66,55 @@ def draw_parts(path: Path, n_vertices: int) -> None:
     biped = es.make_creature("biped", n_vertices=n_vertices)
     parts = es.find_parts(biped).parts
     es.save_figure(es.figure_segments(biped, parts.labels, parts.features.vertices), path)
+
+
+def draw_labels(path: Path, n_vertices: int) -> None:
+    """Draw the parts of a giraffe, and their labels on another pose."""
+    giraffe, other = (es.make_creature("giraffe", pose, n_vertices=n_vertices) for pose in (0, 3))
+    labeled = es.retrieval.LabeledShape(giraffe, es.find_parts(giraffe).parts.labels)
+    found = es.transfer_labels(labeled, other)
+    es.save_figure(es.plot.figure_label_transfer(labeled, other, found), path)
+
+
+def draw_transfer(path: Path, n_vertices: int) -> None:
+    """Draw two characters, each beside another individual in another pose that wears its texture."""
+    pictures = []
+    for kind, pose in (("biped", 2), ("quadruped", 3)):
+        worn = wear_texture(es.make_creature(kind, n_vertices=n_vertices))
+        scan = es.make_creature(kind, pose, n_vertices=n_vertices, individual=1)
+        for attributes in (worn, es.matching.transfer(worn, scan).attributes):
+            camera = es.plot.aim_camera(attributes.mesh, size=FRAME)
+            colors = texture_colors(attributes)
+            pictures.append(es.plot.draw(attributes.mesh, camera, vertex_colors=colors).image)
+    image = np.round(255 * np.hstack(pictures)).astype(np.uint8)
+    Image.fromarray(image).quantize(256).save(path, optimize=True)
+
+
+def wear_texture(mesh: es.TriangleMesh) -> es.io.MeshAttributes:
+    """Return what a mesh wears: texture coordinates, the angle about the upright axis and the height."""
+    x, y, z = mesh.vertices.T
+    u = (np.arctan2(x, z) / (2 * np.pi))[mesh.faces]
+    u += (u[:, :1] - u).round()  # a face across the seam lies on one side of it
+    corners = np.stack([u, y[mesh.faces]], axis=2).reshape(-1, 2)
+    numbers = enumerate(mesh.faces.ravel() + 1, start=1)
+    words = [f"{vertex}/{corner}" for corner, vertex in numbers]
+    lines = [f"v {x} {y} {z}" for x, y, z in mesh.vertices]
+    lines += [f"vt {u} {v}" for u, v in corners]
+    lines += [f"f {one} {two} {three}" for one, two, three in np.reshape(words, (-1, 3))]
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "hero.obj")
+        path.write_text("\n".join(lines), encoding="utf-8")
+        return es.read_mesh(path, attributes=True)[1]
+
+
+def texture_colors(attributes: es.io.MeshAttributes) -> np.ndarray:
+    """Return the color at each vertex: stripes around the shape, checks along it."""
+    mesh = attributes.mesh
+    colors = np.empty((mesh.n_vertices, 3))
+    u, v = attributes.texture_coordinates.reshape(-1, 2).T
+    waves = 2 * np.pi * np.stack([2 * u + v, u + 3 * v, 3 * u], axis=1)
+    colors[mesh.faces.ravel()] = 0.5 + 0.4 * np.sin(waves)
+    return colors
 
 
 def neck_of_giraffe(
