@@ -88,6 +88,28 @@ def test_all_specimens_correspond_and_failures_are_named(built):
     )[0]) > 0  # fmt: skip
 
 
+@pytest.mark.long
+def test_a_separate_piece_is_noted_with_its_share(tmp_path):
+    crumb, plate = es.icosphere(1), es.shapes.grid(3, 3)
+    for number, radius in enumerate((0.03, 0.3)):
+        pieces = (
+            make_specimen(number),
+            es.TriangleMesh(radius * crumb.vertices + [0, 3, 0], crumb.faces),
+            es.TriangleMesh(radius * plate.vertices + [0, -3, 0], plate.faces),
+        )
+        joined = es.geometry.disjoint_union(*pieces)
+        es.write_mesh(joined, tmp_path / f"ball {number}.ply")
+    areas = np.array([es.geometry.surface_area(piece) for piece in pieces])
+    sphere, sheet = (f"{share:.1%}" for share in (areas / areas.sum())[1:])
+    built = es.collections.build_collection(tmp_path, tmp_path / "out")
+    assert [note for note in built.notes["ball 0"] if "separate" in note] == []
+    assert [note for note in built.notes["ball 1"] if "separate" in note] == [
+        f"a separate piece has {sphere} of its area",
+        f"a separate piece has {sheet} of its area",
+    ]
+    assert es.collections.open_collection(tmp_path / "out").notes == built.notes
+
+
 def test_a_collection_is_opened_as_it_was_built(folder, built):
     opened = es.collections.open_collection(folder / "out")
     assert opened.names == built.names

@@ -10,6 +10,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 SOURCES = ROOT / "src" / "eigenshape", ROOT / "certeig" / "src" / "certeig"
 NO_CODE = (tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT)
+# Of an f-string, from Python 3.12 on
+STRING_START, STRING_END = (getattr(tokenize, f"FSTRING_{end}", None) for end in ("START", "END"))
 
 
 def source_files() -> list[Path]:
@@ -46,11 +48,15 @@ def code_tokens(text: str, *, with_imports: bool = True) -> list[tokenize.TokenI
             left_out |= lines_of(node.body[0])
         elif isinstance(node, ast.Import | ast.ImportFrom) and not with_imports:
             left_out |= lines_of(node)
-    return [
-        token
-        for token in tokenize.generate_tokens(io.StringIO(text).readline)
-        if token.type not in NO_CODE and token.string and token.start[0] not in left_out
-    ]
+    found, depth = [], 0
+    for token in tokenize.generate_tokens(io.StringIO(text).readline):
+        # An f-string is one token, as in Python 3.11; later ones also tell what is inside.
+        depth -= token.type == STRING_END
+        is_code = token.string and token.type not in (*NO_CODE, STRING_END)
+        if is_code and not depth and token.start[0] not in left_out:
+            found.append(token)
+        depth += token.type == STRING_START
+    return found
 
 
 def lines_of(node: ast.stmt) -> set[int]:

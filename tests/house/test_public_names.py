@@ -82,6 +82,19 @@ def test_importing_loads_nothing_that_is_not_used():
     assert done.stdout == "[]\n"
 
 
+def test_what_people_come_for_loads_no_statistics():
+    """`scipy.stats` takes as long to load as a spectrum of 5,000 vertices takes to solve, twice."""
+    wanted = [f"es.{name}" for name in sorted(PROMISED)]
+    wanted += [
+        "es.match_shapes",
+        "es.collections.build_collection",
+        "es.collections.carry_landmarks",
+    ]
+    code = f"import sys, eigenshape as es; {', '.join(wanted)}; print('scipy.stats' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "False\n"
+
+
 def test_every_room_is_lazy_in_the_same_way():
     for path in SOURCE.rglob("__init__.pyi"):
         code = path.with_suffix(".py").read_text()

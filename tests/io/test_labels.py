@@ -3,6 +3,7 @@ import pytest
 import trimesh
 from tetrahedra import TETRAHEDRON
 
+import eigenshape as es
 from certeig.kit.errors import FileFormatError, InvalidParameterError
 from eigenshape.io.label_files import read_labels, write_labels
 from eigenshape.io.mesh_files import read_mesh, write_mesh
@@ -125,3 +126,18 @@ def test_labels_that_do_not_fit_are_refused(tmp_path):
     write_mesh(TETRAHEDRON, tmp_path / "a.ply")
     with pytest.raises(FileFormatError, match="must have a property label; they have none"):
         read_labels(tmp_path / "a.ply")
+
+
+def test_parcels_of_vertices_are_no_labels_of_faces(tmp_path):
+    path = tmp_path / "lh.motor.label"
+    path.write_text("#!ascii label\n2\n0 0 0 0 0\n3 0 0 0 0\n")
+    for name in (path, tmp_path / "lh.aparc.annot", tmp_path / "a.label.gii"):
+        with pytest.raises(
+            FileFormatError, match=r"must be those of faces; .* parcels of vertices"
+        ):
+            read_labels(name)
+    mesh = es.icosphere(0)  # what the message advises
+    labels = es.io.read_parcellation(path, mesh).labels[mesh.faces[:, 0]]
+    write_labels(labels, tmp_path / "labels.txt")
+    assert read_labels(tmp_path / "labels.txt").tolist() == labels.tolist()
+    assert set(labels.tolist()) == {-1, 0}

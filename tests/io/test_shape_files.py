@@ -395,6 +395,15 @@ def test_missing_returns_are_refused_or_dropped_when_asked(tmp_path):
         (b"# nothing\n", "A file of points must hold points; it holds none"),
         (b"0 0\n", "A vertex must have three numbers; line 1 is '0 0'"),
         (
+            b"0,0,0\n",
+            "three numbers; line 1 is '0,0,0'. Put # before lines of text, spaces between",
+        ),
+        (
+            b"//X Y Z\n0 0 0\n",
+            "a number; line 1 has '//X' in '//X Y Z'. Put # before lines of text",
+        ),
+        (b"0,5 0 1\n", "a number; line 1 has '0,5' in '0,5 0 1'. .* and a point before decimals"),
+        (
             b"Version 1.0\nS001 1 2 3\n",
             "landmarks of Landmark Editor. es.morphometrics.read_landmarks",
         ),
@@ -404,6 +413,33 @@ def test_broken_tables_are_named(tmp_path, content, match):
     (tmp_path / "a.pts").write_bytes(content)
     with pytest.raises(FileFormatError, match=match):
         read_points(tmp_path / "a.pts")
+
+
+@pytest.mark.parametrize("name", ["a.xyz", "a.ply"])
+def test_heights_that_were_not_measured_are_noticed(tmp_path, name):
+    points = np.random.default_rng(0).normal(size=(20, 3))
+    path = tmp_path / name
+    write_points(PointCloud(points), path)
+    assert read_points(path).n_points == 20  # warnings are errors in tests
+    points[3, 2] = -9999
+    write_points(PointCloud(points), path)
+    with pytest.warns(UserWarning, match=r"measured nothing \(-9999, -32768\); if so, leave out"):
+        assert read_points(path).n_points == 20
+    # It is no height that is missing if there are lower ones.
+    points[4, 2] = -10_001
+    write_points(PointCloud(points), path)
+    assert read_points(path).n_points == 20
+
+
+def test_a_table_is_read_as_its_messages_say(tmp_path):
+    (tmp_path / "a.csv").write_text("x,y,z\n0,0.5,1\n1,0,1\n")
+    with pytest.raises(FileFormatError, match=r"Points, x y z on each line, .* ends in \.xyz\.$"):
+        read_shape(tmp_path / "a.csv")
+    with pytest.raises(FileFormatError, match=r"it is '\.csv'\.$"):  # no points are read there
+        read_mesh(tmp_path / "a.csv")
+    table = (tmp_path / "a.csv").read_text().replace(",", " ")
+    (tmp_path / "a.xyz").write_text(f"# {table}")
+    assert read_shape(tmp_path / "a.xyz").points.tolist() == [[0, 0.5, 1], [1, 0, 1]]
 
 
 def test_points_are_written_exactly(tmp_path):

@@ -381,6 +381,8 @@ NAMED: dict[str, Callable[[], Any]] = {
     "extend_scalar.values": lambda: [1.0, 2.0],
     "fixed": lambda: np.arange(4),
     "flatten_conformally.mesh": with_boundary,
+    "figure_matches.matches": lambda: shelf().query(body()),
+    "figure_matches.meshes": lambda: {match.name: body() for match in shelf().query(body())},
     "flat_torus_eigenvalues.periods": lambda: np.eye(2),
     "flux": height,
     "geodesic_path.start": lambda: 0,

@@ -347,6 +347,7 @@ WITHOUT = {
     "figure_fields",
     "figure_label_transfer",
     "figure_match",
+    "figure_matches",
     "figure_poses",
     "figure_segments",
     "figure_stability",

@@ -103,6 +103,7 @@ MADE: dict[str, Callable[[Shared], Any]] = {
 # What may change inside values.
 CHANGING = {
     "IndexState": "what an index holds at present",
+    "RowTree": "moves while a map is refined; that of a value stays where it is",
     "SymmetricFactor": "compiled loops are made for arrays that can be written to",
 }
 HANDLES = {

@@ -315,6 +315,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         v.poisson.solve(v.many_laplacian.mass @ v.height),
         v.bound.solve(v.animal.vertices, values=[[1.0], [2.0]], targets=[[3.0]]),
     ],
+    "PatchDescriptor.is_mirror_image": lambda v: v.by_patches[0].is_mirror_image(v.by_patches[1]),
     "Rate.at": lambda v: es.stability.theorem_rate("lipschitz", 2).at([0.1, 0.2], 0.01),
     "RecoveredGeometry.whole_characteristic": lambda v: [
         v.recovered.whole_characteristic(even=even) for even in (False, True)
@@ -428,9 +429,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         v.ball, v.torus, es.stability.StabilityPlan(k=3, n_samples=150, times=(0.05,))
     ),
     "compare_spectra": lambda v: es.spectral.compare_spectra(v.spectrum, v.spectrum2),
-    "compose_maps": lambda v: es.spectral.compose_maps(
-        v.map, es.spectral.map_from_points(v.spectrum2, v.spectrum, np.arange(700))
-    ),
     "compress_mesh": lambda v: es.spectral.compress_mesh(v.torus),
     "connection_laplacian": lambda v: es.operators.connection_laplacian(v.ball),
     "correspondence_graph": lambda v: es.stability.correspondence_graph(
@@ -827,6 +825,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "Registration.inverse": lambda v: v.motion.inverse().rotation,
     "Registration.after": lambda v: v.motion.after(v.motion).rotation,
     "ShapeMatch.pull": lambda v: v.fish_match.pull(v.fish_pose.vertices),
+    "ShapeMatch.save": lambda v: written(v.folder, ".npz", v.fish_match.save),
     "ShapeMatch.sure": lambda v: v.fish_match.sure(0.3),
     "match_shapes": lambda v: [
         es.match_shapes(v.fish, v.fish_target).weights,
@@ -835,6 +834,13 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "fuse_scans": lambda v: es.matching.fuse_scans([v.fish_scan]).mesh.vertices,
     "prepare_target": lambda v: es.matching.prepare_target(v.fish).area,
     "take_pose": lambda v: es.matching.take_pose(v.fish, v.fish_pose, match=v.fish_match),
+    "figure_matches": lambda v: drawn(
+        es.plot.figure_matches(
+            v.ball,
+            v.reader.query(v.by_patches[0]),
+            meshes={"by patches 0": v.ball, "by patches 1": v.torus},
+        )
+    ),
     "figure_match": lambda v: drawn(es.plot.figure_match(v.fish, v.fish_pose, v.fish_match)),
     "transfer_deformation": lambda v: es.deformation.transfer_deformation(
         v.animal, v.pose, v.pose, v.map

@@ -40,7 +40,7 @@ def test_the_angle_of_two_modes_that_mix_is_found():
     assert found.lost.tolist() == [0, 1]
     assert "by at most 60°" in found.explain()
     assert "15 modes lie in groups whose eigenvalues are too close" in found.explain()
-    assert "2 groups are not those of the reference; the first is modes 0 to 0." in found.explain()
+    assert "2 groups are not those of the reference; the first is mode 0." in found.explain()
 
 
 def test_groups_are_those_that_both_spectra_separate():

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from eigenshape.scans.raster import Raster
+from eigenshape.scans.raster import Raster, depths_at
 from eigenshape.shapes.surfaces import icosphere
 
 QUAD = np.array([[0, 1, 2], [0, 2, 3]])
@@ -114,3 +114,13 @@ def test_what_is_outside_of_the_picture_is_cut_off():
 def test_a_face_seen_from_its_edge_covers_nothing():
     points = np.array([[0.0, 0.5, 0], [4, 0.5, 0], [2, 0.5, 9]])
     assert (Raster.of(points, np.array([[0, 1, 2]]), 4, 4).face == -1).all()
+
+
+def test_depths_at_some_pixels_are_those_of_the_picture():
+    ball = icosphere(3)
+    points = ball.vertices * [20, 24, 9] + [24, 28, 0]
+    pixels = points[:, :2].astype(np.int64)
+    seen = Raster.of(points, ball.faces, 56, 56)
+    wanted = seen.depth[pixels[:, 1], pixels[:, 0]]
+    assert len(np.unique(wanted)) > 100
+    assert np.array_equal(depths_at(points, ball.faces, pixels, 56), wanted)

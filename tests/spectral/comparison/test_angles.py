@@ -42,7 +42,7 @@ def test_by_hand():
     np.testing.assert_allclose(found.gaps, [1, 1])
     # R of the first has length sin θ cos θ, its quotient is sin² θ, and the next eigenvalue is 1.
     np.testing.assert_allclose(found.bounds[0], np.arcsin(sin * cos / (1 - sin**2)), rtol=1e-9)
-    assert "turn by 17.2° in the median" in found.explain()
+    assert "turn by 17.2° in the median and by at most 17.2° (number " in found.explain()
 
 
 def test_small_and_right_angles_keep_their_digits():

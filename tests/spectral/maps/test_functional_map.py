@@ -93,9 +93,9 @@ def test_a_pair_tells_one_side_from_the_other():
 def test_maps_compose(hand, mixed):
     forth = es.functional_map(hand, mixed, pairs(PLACES))
     back = es.functional_map(mixed, hand, pairs(PLACES)[:, ::-1])
-    np.testing.assert_allclose(es.spectral.compose_maps(forth, back).matrix, np.eye(20), atol=1e-7)
+    np.testing.assert_allclose((back @ forth).matrix, np.eye(20), atol=1e-7)
     wide = es.spectral.refine_map(back, 30)
-    composed = es.spectral.compose_maps(forth, wide)
+    composed = wide @ forth
     assert composed.matrix.shape == (30, 20)
     values = np.sin(HAND.vertices)
     one_by_one = es.spectral.transfer_function(wide, es.spectral.transfer_function(forth, values))
@@ -275,8 +275,10 @@ def test_maps_that_do_not_meet_are_refused(hand, bent):
     forth = es.functional_map(hand, bent, pairs() % len(bent.eigenvectors))
     with pytest.raises(
         es.InvalidParameterError,
-        match="The target of the first map must be the source of the second",
+        match="The target of the map on the right must be the source of the one on the left",
     ):
-        es.spectral.compose_maps(forth, forth)
+        forth @ forth
+    with pytest.raises(TypeError, match="unsupported operand"):
+        forth @ forth.matrix[0].tolist()
     turned = replace(forth, source=bent, target=hand)
-    assert es.spectral.compose_maps(forth, turned).matrix.shape == (20, 20)
+    assert (turned @ forth).matrix.shape == (20, 20)
