@@ -383,6 +383,7 @@ NAMED: dict[str, Callable[[], Any]] = {
     "flatten_conformally.mesh": with_boundary,
     "figure_matches.matches": lambda: shelf().query(body()),
     "figure_matches.meshes": lambda: {match.name: body() for match in shelf().query(body())},
+    "PatchDescriptor.is_mirror_image.other": patched,  # its annotation is a name
     "flat_torus_eigenvalues.periods": lambda: np.eye(2),
     "flux": height,
     "geodesic_path.start": lambda: 0,

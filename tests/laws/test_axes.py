@@ -185,6 +185,7 @@ NO_POWER = {
     "random_planes": OF_TWO_UNITS,
     "sphere_functional_eigenvalues": "the sphere has radius 1",
 }
+AXES = "the signs of principal axes, and those along which nothing varies"
 # Where the unit is no power of two, roundings decide what has no other reason to be one thing or the other.
 BY_ROUNDING = {
     "closest_points": "a point on an edge is in either triangle",
@@ -193,6 +194,7 @@ BY_ROUNDING = {
     "detect_watermark": "the score where no watermark is",
     "prepare_heat_geodesics": "holds a shape in a power of two of its unit",
     "prepare_vector_heat": "holds a shape in a power of two of its unit",
+    "train_codebook": AXES,
 }
 
 
@@ -244,6 +246,7 @@ ORDERED = {
     "prepare_heat_geodesics": BY_CORNER,
     "prepare_vector_heat": BY_CORNER,
     "sample_surface": BY_SEARCH,
+    "train_codebook": AXES,
     "transfer": BY_CORNER,
     "transfer_labels": "names a corner of the clearest face",
     "witness_region": BY_SEARCH,

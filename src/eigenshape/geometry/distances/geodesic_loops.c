@@ -6,6 +6,9 @@ enum { FRONT = -1 };
 enum { CHILDREN = 4 };                 /* of an entry of the heap: fewer levels than with two */
 static const double ABOVE = 1 + 1e-14; /* more than the rounding of a square */
 static const double LEAST_SQUARE = 0x1p-900; /* smaller ones are not exact to so many digits */
+/* A vertex halfway between two chosen ones, as on a split edge, belongs to the first, however sums are
+   rounded. */
+static const double NEARER = 1 - 1e-9;
 
 /* Entries starts[v] to starts[v + 1] are the neighbors of vertex v, one after the other around it: each
    by its number, its distance, and its distance from the next. The last is -1 where no triangle is in
@@ -330,9 +333,8 @@ KERNEL void choose_farthest(const struct fans *fans, double radius, const struct
             fill_row(&rows[number * n], n, reached, distances, count);
         for (int64_t i = 0; i < count; i++) {
             int64_t v = reached[i];
-            if (!(distances[i] < least[v])) continue;
-            least[v] = distances[i];
-            nearest[v] = greater(number, 0);
+            if (distances[i] < NEARER * least[v]) nearest[v] = greater(number, 0);
+            least[v] = minimum(distances[i], least[v]);
         }
         farthest = 0;
         for (int64_t v = 1; v < n; v++) farthest = least[v] > least[farthest] ? v : farthest;
