@@ -284,6 +284,7 @@ OF_THE_WHOLE = "is measured by the whole shape"
 OF_A_BASIS = "is a basis of eigenspaces that both copies share, or stands in one"
 OF_ONE_COPY = "the right values are of the first copy"
 NOT_FOR_EACH = {
+    "ShapeMatch.pull": OF_THE_WHOLE,
     "Solver.eigs": OF_A_BASIS,
     "approximate_heat_signature": "is an estimate by random vectors",
     "boundary_load": OF_ONE_COPY,
