@@ -82,7 +82,7 @@ def repair(
         steps.require_output(output, (".vtu",), "A mesh of tetrahedra or segments")
     print_repairs(done.report)
     if isinstance(done.mesh, es.TriangleMesh):
-        steps.save_like(mesh, done.mesh, output, scene=scene)
+        steps.save_like(mesh, done.mesh, output, cells=cells, scene=scene)
     else:
         es.io.write_fields(done.mesh, output, {})
         print_written(output)
@@ -91,10 +91,10 @@ def repair(
         print_json({"path": mesh, "output": output, "report": done.report, **facts})
         return
     rows = []
-    for name, value in facts["before"].items():
-        if isinstance(value, int):  # counts, and yes or no
-            texts = [_format_fact(fact[name]) for fact in facts.values()]
-            rows.append([name.replace("_", " "), *texts])
+    for name in facts["before"] | facts["after"]:  # of points, others than of the surface
+        values = [fact.get(name) for fact in facts.values()]
+        if any(isinstance(value, int) for value in values):  # counts, and yes or no
+            rows.append([name.replace("_", " "), *map(_format_fact, values)])
     print_table("Repaired", ["", *facts], rows)
 
 
