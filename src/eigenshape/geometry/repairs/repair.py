@@ -191,14 +191,9 @@ def repair(
     shape = as_shape(shape)
     names = require_repairs(names, names_of_repairs(shape), f"Repairs of {shape!r}")
     if isinstance(shape, PointCloud):
-        done = RepairedCloud(shape, (), np.arange(shape.n_points))
-        for name in names:
-            if name == "drop_missing":
-                continue
-            step = drop_duplicate_points(done.cloud)  # which is also all that auto does
-            source = done.source_points[step.source_points]
-            done = RepairedCloud(step.cloud, done.report + step.report, source)
-        return done
+        if set(names) <= {"drop_missing"}:
+            return RepairedCloud(shape, (), np.arange(shape.n_points))
+        return drop_duplicate_points(shape)  # which is also all that auto does
     steps: dict[str, Step] = {
         **REPAIRS,
         "weld": partial(weld, tolerance=tolerance),
