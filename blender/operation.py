@@ -24,6 +24,9 @@ ADVICE = {
     r'Try repair\(\w+, \["auto", "largest_component"\]\).*': (
         "Here: tick Repair, or keep one piece of those that Mesh > Separate > By Loose Parts makes."
     ),
+    r'Try repair\(\w+, \["auto", "cut_one_sided"\]\).*': (
+        "Here: in Edit Mode, select a row of edges across it, and choose Mesh > Split > Faces by Edges."
+    ),
     r"Create one with ShapeIndex\.create.*": (
         "Choose another folder, or press Add to Index: it makes one there."
     ),

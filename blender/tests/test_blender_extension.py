@@ -501,6 +501,30 @@ def test_a_match_to_a_smaller_unit_advises_what_blender_has(animal, add, creatur
         bpy.ops.eigenshape.match(scale="known")
 
 
+def test_a_piece_with_one_side_only_is_cut_as_the_message_advises(add):
+    # A strip around a circle, two vertices across, which turns over once on its way
+    turn = np.repeat(2 * np.pi * np.arange(24) / 24, 2)
+    across = np.tile([-0.3, 0.3], 24)
+    rim = 1 + across * np.cos(turn / 2)
+    points = np.stack([rim * np.cos(turn), rim * np.sin(turn), across * np.sin(turn / 2)], axis=1)
+    numbers = [*range(48), 1, 0]
+    quads = [[numbers[at + side] for side in (0, 2, 3, 1)] for at in range(0, 48, 2)]
+    owner = add("strip", points, quads)
+    advice = r"Here: in Edit Mode, .* choose Mesh > Split > Faces by Edges\.$"
+    with pytest.raises(RuntimeError, match=advice) as caught:
+        bpy.ops.eigenshape.find_parts()
+    assert "command line" not in str(caught.value)
+    for part in (*owner.data.polygons, *owner.data.vertices, *owner.data.edges):
+        part.select = False
+    (across,) = [edge for edge in owner.data.edges if set(edge.vertices) == {0, 1}]
+    across.select = True
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_mode(type="EDGE")
+    bpy.ops.mesh.edge_split(type="EDGE")
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert bpy.ops.eigenshape.find_parts() == FINISHED
+
+
 def test_pieces_that_a_spectrum_refuses_are_named_with_what_blender_does(add, monkeypatch):
     """What a spectrum of many pieces advises; thousands of pieces would be made to meet it."""
     sphere = es.icosphere(1)

@@ -54,7 +54,9 @@ def test_a_folder_stands_for_its_files(folder, tmp_path, monkeypatch):
     state = opened(folder)
     assert state["n_vertices"] == 12
     assert [name for _, name in state["shapes"]] == ["a", "b", "c"]
-    with pytest.raises(es.InvalidParameterError, match="There must be meshes or points"):
+    with pytest.raises(
+        es.InvalidParameterError, match="Folders of shapes must hold meshes or points"
+    ):
         open_workspace([tmp_path])
     monkeypatch.setattr(folders, "MOST_LISTED", 2)
     assert len(opened(folder)["shapes"]) == 2

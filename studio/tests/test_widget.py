@@ -1,5 +1,6 @@
 """The widget answers the same calls in messages, and a real JupyterLab shows it."""
 
+import gc
 import json
 import re
 import secrets
@@ -19,6 +20,7 @@ from playwright.sync_api import TimeoutError as NothingSeenError
 
 import eigenshape as es
 from eigenshape_studio.tab.workspace import Workspace
+from eigenshape_studio.widget import ShapeWidget
 from eigenshape_studio.wire import decode, encode
 
 CELL = """
@@ -60,6 +62,16 @@ def test_view_makes_a_widget_of_the_shape_and_its_values():
     assert list(widget.workspace.fields) == ["values"]
     assert "render" in widget._esm
     widget.close()
+
+
+@pytest.mark.parametrize("given", [{"mesh": None}, {"mesh": es.icosphere(1), "index": "nowhere"}])
+def test_a_refused_widget_is_forgotten_without_an_error(given, monkeypatch):
+    unraisable = []
+    monkeypatch.setattr(sys, "unraisablehook", unraisable.append)
+    with pytest.raises(es.EigenshapeError, match=r"mesh must be|must be an index"):
+        ShapeWidget(**given)
+    gc.collect()
+    assert unraisable == []
 
 
 def test_calls_are_answered_with_their_number(monkeypatch):

@@ -216,6 +216,10 @@ def test_landmarks_that_fit_no_specimen_are_refused(scans, tmp_path):
     es.morphometrics.write_landmarks({"hnad 0": landmarks(0)}, table)
     assert "Landmarks must be of specimens" in refused(table)
     (tmp_path / "empty").mkdir()
+    out = tmp_path / "out"
+    done = run("collection", tmp_path / "empty", "-o", out, code=2)
+    assert "Folders of shapes must hold meshes or points" in done.stderr
+    assert "index" not in done.stderr
     message = "A folder of landmarks must hold files that end in .mrk.json"
     assert message in refused(tmp_path / "empty", code=1)
     (tmp_path / "twice").mkdir()

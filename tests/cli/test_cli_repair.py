@@ -1,6 +1,7 @@
 """`eigenshape repair`; and what verbs keep of the files that they read: polygons, textures, labels."""
 
 import json
+import re
 
 import meshio
 import numpy as np
@@ -20,7 +21,9 @@ from eigenshape import (
 )
 from eigenshape.deformation.handles import Translation
 from eigenshape.geometry.repairs.repair import REPAIRS
+from eigenshape.geometry.resolution.tetrahedralization import tetrahedralize
 from eigenshape.geometry.topology import is_closed
+from eigenshape.io.field_files import write_fields
 from eigenshape.io.folders import find_items
 from eigenshape.io.label_files import read_labels
 from eigenshape.io.shape_files import write_points
@@ -333,3 +336,23 @@ def test_points_become_a_surface_that_is_written(tmp_path):
     done = run("repair", tmp_path / "ball.xyz", "-o", tmp_path / "ball.ply")
     assert "reconstruct_surface made" in done.stderr
     assert is_closed(read_mesh(tmp_path / "ball.ply"))
+
+
+def test_what_points_have_besides_is_said_not_to_be_kept(tmp_path):
+    cloud = tmp_path / "cloud.ply"
+    write_points(PointCloud(icosphere(3).vertices), cloud)
+    done = run("repair", cloud, "-o", tmp_path / "ball.ply", "--json")
+    assert "lost" not in done.stderr
+    assert "made of points or cells of cloud.ply; their colors and values, if" in done.stderr
+    facts = json.loads(done.stdout)
+    assert (facts["before"]["points"], facts["after"]["vertices"]) == (642, 2000)
+    table = run("repair", cloud, "-o", tmp_path / "ball.ply").stdout
+    assert re.search(r"points +│ +642 │ - ", table)
+    assert re.search(r"closed +│ +- │ yes ", table)
+    named = ("--repair", "drop_duplicate_points")  # as info advises
+    assert "reconstruct" in run("repair", cloud, *named, "-o", tmp_path / "ball.ply").stderr
+    ball = icosphere(1)
+    solid = tetrahedralize(ball)
+    write_fields(solid, tmp_path / "solid.vtu", {"height": solid.points[:, 2]})
+    thin = run("decimate", tmp_path / "solid.vtu", "--ratio", "0.8", "-o", tmp_path / "thin.vtu")
+    assert "note: the surface was made of points or cells of solid.vtu" in thin.stderr

@@ -64,7 +64,7 @@ def test_two_files_of_one_name_are_refused(folder):
 
 
 def test_no_mesh_is_an_error(tmp_path):
-    with pytest.raises(InvalidParameterError, match="There must be meshes"):
+    with pytest.raises(InvalidParameterError, match="Folders of shapes must hold meshes"):
         find_items(tmp_path)
 
 

@@ -78,12 +78,11 @@ def repair(
     """
     steps.require_mesh_path(output)
     before, done = steps.load_repaired(mesh, repair, cells, scene)
-    if not isinstance(done.mesh, es.TriangleMesh):
-        steps.require_output(output, (".vtu",), "A mesh of tetrahedra or segments")
     print_repairs(done.report)
     if isinstance(done.mesh, es.TriangleMesh):
-        steps.save_like(mesh, done.mesh, output, scene=scene)
+        steps.save_like(mesh, done.mesh, output, cells=cells, scene=scene)
     else:
+        steps.require_output(output, (".vtu",), "A mesh of tetrahedra or segments")
         es.io.write_fields(done.mesh, output, {})
         print_written(output)
     facts = {"before": steps.shape_facts(before), "after": steps.shape_facts(done.mesh)}
@@ -91,10 +90,10 @@ def repair(
         print_json({"path": mesh, "output": output, "report": done.report, **facts})
         return
     rows = []
-    for name, value in facts["before"].items():
-        if isinstance(value, int):  # counts, and yes or no
-            texts = [_format_fact(fact[name]) for fact in facts.values()]
-            rows.append([name.replace("_", " "), *texts])
+    for name in facts["before"] | facts["after"]:  # of points, others than of the surface
+        values = [fact.get(name) for fact in facts.values()]
+        if any(isinstance(value, int) for value in values):  # counts, and yes or no
+            rows.append([name.replace("_", " "), *map(_format_fact, values)])
     print_table("Repaired", ["", *facts], rows)
 
 
@@ -133,8 +132,7 @@ def decimate(
         facts = {"n_vertices": done.mesh.n_vertices, "n_faces": done.mesh.n_faces}
         print_json({"path": mesh, "output": output, "report": done.report, **facts})
     else:
-        for sentence in done.report:
-            out.print(escape_text(sentence))
+        out.print(escape_text("\n".join(done.report)))
 
 
 def tetrahedralize(

@@ -97,7 +97,7 @@ def find_items(
     items = [item for source in folders for item in _items_of(as_path(source, "sources"))]
     if not items:
         raise InvalidParameterError(
-            f"There must be meshes or points ({', '.join(SHAPE_FORMATS)}) to index; "
+            f"Folders of shapes must hold meshes or points ({', '.join(SHAPE_FORMATS)}); "
             f"{', '.join(map(str, folders)) or 'an empty list'} holds none."
         )
     # A file that is given twice counts once.

@@ -68,8 +68,10 @@ class ShapeWidget(anywidget.AnyWidget):
 
     def close(self) -> None:
         """Stop what is still computed, and remove the widget."""
-        self.workspace.close()
-        self._threads.shutdown(wait=False)
+        # Python closes a widget that it forgets, also one whose shape was refused
+        if "_threads" in vars(self):
+            self.workspace.close()
+            self._threads.shutdown(wait=False)
         super().close()
 
     def __repr__(self) -> str:

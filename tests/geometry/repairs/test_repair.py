@@ -1,3 +1,5 @@
+import re
+
 import numpy as np
 import pytest
 from broken_meshes import moebius, soup, tetrahedra, with_slivers
@@ -223,6 +225,24 @@ def test_three_sheets_on_one_edge_are_welded_there():
     points = [[0, 0, 0], [0, 0, 1], [1, 0, 0], [-1, 0, 0], [0, 1, 0]]
     book = TriangleMesh(points, [[0, 1, 2], [0, 1, 3], [0, 1, 4]])
     assert weld_seams(soup(book)).mesh.n_vertices == 5
+
+
+def test_auto_names_what_it_leaves():
+    ball = icosphere(1)
+    a, b, _ = ball.faces[0]
+    fin = TriangleMesh([*ball.vertices, [2, 2, 2]], [*ball.faces, [a, b, ball.n_vertices]])
+    done = repair(fin, ["auto"])
+    edge = sorted([int(a), int(b)])
+    assert done.report == (
+        f"auto left 1 edge with more than two faces, the first at vertices {edge}",
+    )
+    assert np.array_equal(done.mesh.faces, fin.faces)
+    (sentence,) = repair(moebius(), ["auto"]).report
+    assert re.match(
+        r"auto left 3 edges of pieces with one side only \(cut_one_sided opens them\)", sentence
+    )
+    (cut,) = repair(moebius(), ["cut_one_sided"]).report
+    assert cut.startswith("cut_one_sided cut 1 piece with one side only along 3 edges")
 
 
 def test_tetrahedra_are_repaired_too():

@@ -7,6 +7,8 @@ from eigenshape.features.parts import find_parts
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import disjoint_union
+from eigenshape.io.labeled_shapes import read_labeled_shape
+from eigenshape.io.mesh_files import write_mesh
 from eigenshape.plot.sheet import figure_label_transfer
 from eigenshape.retrieval.labels import transfer
 from eigenshape.retrieval.labels.labeled_shape import LabeledShape
@@ -163,6 +165,21 @@ def test_a_labeled_shape_with_a_face_without_area_is_left_out_by_its_number():
     np.testing.assert_allclose(found.confidence, alone.confidence, rtol=1e-12)  # sums of two shapes
     with pytest.raises(InvalidShapeError, match="Faces must have area"):
         transfer_labels([broken, broken], fish)
+
+
+def test_the_remedy_for_a_labeled_shape_repairs_its_labels_too(tmp_path):
+    ball = icosphere(2)
+    torn = TriangleMesh(ball.vertices, [*ball.faces, ball.faces[0]])
+    broken = LabeledShape(torn, np.append(np.arange(ball.n_faces), 0))
+    with pytest.raises(
+        InvalidShapeError, match=r"must differ.* Try es\.io\.read_labeled_shape\(path"
+    ):
+        transfer_labels(broken, ball)
+    path = tmp_path / "torn.ply"
+    write_mesh(torn, path, face_labels=broken.labels)
+    repaired = read_labeled_shape(path, repair=["auto"])
+    assert repaired.labels.tolist() == list(range(ball.n_faces))
+    assert len(repaired.points.vertices) > 0
 
 
 def test_one_label_a_face_is_required():

@@ -74,15 +74,18 @@ def note_seams(shape: Shape, name: str = "this shape") -> None:
 
 def load_repaired(
     path: Path, repairs: str, cells: CellKind | None, scene: str | int | None
-) -> tuple[Mesh, RepairedMesh[Mesh]]:
-    """Read a mesh of any dimension and repair it; return it as it was read and as it is now."""
+) -> tuple[Shape, RepairedMesh[Mesh]]:
+    """Read a shape, make a surface of points, and repair it; return it as it was read and as it is now."""
     names = repair_names(repairs)
     at_once = ["drop_missing"] if drops_missing(names) else []
     found: Any = shape_files.load_shape(path, at_once, cells=cells, scene=scene)
-    if isinstance(found, RepairedCloud) or found.mesh.dim == found.mesh.points.shape[1] == 2:
+    cloud = found.cloud if isinstance(found, RepairedCloud) else None
+    if cloud or found.mesh.dim == found.mesh.points.shape[1] == 2:
         found = read_surface(path, scene=scene)
+    if cloud:  # of which `read_surface` has left out equal points
+        names = tuple(name for name in names if name != "drop_duplicate_points")
     done = repair(found.mesh, names)
-    return found.mesh, replace(done, report=found.report + done.report)
+    return cloud or found.mesh, replace(done, report=found.report + done.report)
 
 
 def load_poses(before: Path, after: Path, repairs: str) -> tuple[TriangleMesh, TriangleMesh]:

@@ -20,11 +20,13 @@ from eigenshape.io.formats.registry import (
     WITH_COLORS,
     WITH_MORE,
     WRITTEN,
+    CellKind,
     is_upright,
     suffix_of,
 )
 from eigenshape.io.label_files import write_labels
 from eigenshape.io.mesh_files import read_mesh, save_mesh, write_mesh
+from eigenshape.io.shape_files import read_shape
 from eigenshape.plot.camera import UP_NAMES, VIEWS, Up, View
 from eigenshape.plot.fields import value_colors
 from eigenshape.plot.figure import require_picture_path, save_figure
@@ -102,6 +104,7 @@ def save_like(
     *,
     colors: UInt8[np.ndarray, "n 3"] | None = None,
     face_labels: Int[np.ndarray, " f"] | None = None,
+    cells: CellKind | None = None,
     scene: str | None = None,
 ) -> None:
     """Write a mesh with all else that its file holds, and print so, and what is lost, on stderr.
@@ -117,16 +120,25 @@ def save_like(
         Where its vertices are to be written.
     colors, face_labels : optional
         Colors and labels to write, as in `write_mesh`.
-    scene : str, optional
-        The scene that was read.
+    cells, scene : str, optional
+        The kind of cells and the scene that were read.
     """
     attributes = None
     if suffix_of(source, None, SHAPE_FORMATS) in WITH_MORE:
         try:
-            found = read_mesh(source, attributes=True, drop_missing=True, scene=scene)[1]
+            found = read_mesh(source, attributes=True, drop_missing=True, cells=cells, scene=scene)[
+                1
+            ]
             attributes = carry_attributes(found, mesh)
-        except FileFormatError as error:  # the shape was read; only the rest is broken
-            err.print(f"[yellow]lost:[/] all but the shape. {escape_text(error)}")
+        except FileFormatError as error:
+            shape = read_shape(source, drop_missing=True, cells=cells, scene=scene)
+            if isinstance(shape, TriangleMesh):  # only the rest of the file is broken
+                err.print(f"[yellow]lost:[/] all but the shape. {escape_text(error)}")
+            else:
+                err.print(
+                    f"[yellow]note:[/] the surface was made of points or cells of {escape_text(source.name)}; "
+                    "their colors and values, if there are any, are not kept"
+                )
     written = mesh if moved is None else TriangleMesh(moved, mesh.faces)
     lost = save_mesh(written, path, colors=colors, face_labels=face_labels, attributes=attributes)
     print_written(path)

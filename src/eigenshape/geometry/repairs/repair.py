@@ -1,16 +1,18 @@
 """Repair a shape by names, choose repairs automatically, and suggest them."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any, overload
 
 import numpy as np
 
 from eigenshape._corners import scaled_corners
-from eigenshape._errors import InvalidShapeError
+from eigenshape._errors import InvalidShapeError, count_nouns
 from eigenshape._vectors import size_one, triangle_areas
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.conversion import MeshLike, ShapeLike, as_shape
+from eigenshape.geometry.face_turns import inconsistent_edges
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.holes import fill_holes
 from eigenshape.geometry.repairs.one_sided import cut_one_sided
@@ -32,7 +34,7 @@ from eigenshape.geometry.repairs.repair_steps import (
     weld,
     weld_seams,
 )
-from eigenshape.geometry.topology import boundary_loops, vertex_components
+from eigenshape.geometry.topology import boundary_loops, non_manifold_edges, vertex_components
 
 # Shares of the area of a surface up to which `suggest_repairs` takes something for a fault of the
 # scan rather than for a part of the shape or its boundary.
@@ -42,11 +44,23 @@ LARGEST_HOLE = 0.05  # a hole; for comparison, the open side of half a ball has 
 
 
 def repair_as_needed(mesh: MeshT) -> RepairedMesh[MeshT]:
-    """Apply the repairs of `AUTO` in turn until none of them changes the mesh.
+    """Apply the repairs of `AUTO` in turn until none of them changes the mesh, and report what is left.
 
     Raise InvalidShapeError if no face would remain.
     """
-    return _until_sound(mesh, AUTO)[0]
+    done = _until_sound(mesh, AUTO)[0]
+    if not isinstance(done.mesh, TriangleMesh):
+        return done
+    left = {
+        "with more than two faces": non_manifold_edges(done.mesh),
+        "of pieces with one side only (cut_one_sided opens them)": inconsistent_edges(done.mesh),
+    }
+    report = [
+        f"auto left {count_nouns(len(edges), 'edge')} {which}, the first at vertices {edges[0].tolist()}"
+        for which, edges in left.items()
+        if len(edges)
+    ]
+    return replace(done, report=(*done.report, *report))
 
 
 # Duplicate faces hide seams, and welding a seam can create duplicates, so both are handled first.
@@ -131,7 +145,7 @@ def repair(
     -------
     RepairedMesh or RepairedCloud
         The repaired shape, with one sentence of report for each repair that "auto" or the caller
-        applied.
+        applied, and for what "auto" leaves.
 
     Raises
     ------
@@ -149,7 +163,8 @@ def repair(
     -----
     "auto" applies whichever of `drop_duplicate_faces`, `weld_seams`, `collapse_needles`,
     `drop_degenerate`, `drop_unreferenced` and, on surfaces, `orient` change the mesh, until none
-    does. On a cloud it is `drop_duplicate_points`. It fills no hole and removes no component.
+    does. On a cloud it is `drop_duplicate_points`. It fills no hole and removes no component, and
+    it leaves edges with more than two faces and pieces with one side only, which the report names.
 
     `weld` joins vertices at the same place, and so closed pieces that touch; `weld_seams` joins
     only boundary edges that lie on each other, up to the rounding of stored coordinates: of single
@@ -176,14 +191,9 @@ def repair(
     shape = as_shape(shape)
     names = require_repairs(names, names_of_repairs(shape), f"Repairs of {shape!r}")
     if isinstance(shape, PointCloud):
-        done = RepairedCloud(shape, (), np.arange(shape.n_points))
-        for name in names:
-            if name == "drop_missing":
-                continue
-            step = drop_duplicate_points(done.cloud)  # which is also all that auto does
-            source = done.source_points[step.source_points]
-            done = RepairedCloud(step.cloud, done.report + step.report, source)
-        return done
+        if set(names) <= {"drop_missing"}:
+            return RepairedCloud(shape, (), np.arange(shape.n_points))
+        return drop_duplicate_points(shape)  # which is also all that auto does
     steps: dict[str, Step] = {
         **REPAIRS,
         "weld": partial(weld, tolerance=tolerance),

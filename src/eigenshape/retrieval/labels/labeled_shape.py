@@ -8,6 +8,7 @@ from jaxtyping import Float, Int
 from certeig.kit.arrays import ReadOnly, freeze, record
 from eigenshape._arrays import face_labels
 from eigenshape._corners import mean_normals
+from eigenshape._errors import InvalidShapeError, try_auto
 from eigenshape.geometry.conversion import as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.normalize import normalize_mesh
@@ -147,4 +148,12 @@ class LabeledShape(ReadOnly):
     @cached_property
     def points(self) -> LabelPoints:
         """Return the points that are matched with those of other shapes."""
-        return label_points(self.mesh)
+        try:
+            return label_points(self.mesh)
+        except InvalidShapeError as error:
+            # A repair alone removes and splits faces, and the labels would no longer fit
+            remedy = (
+                'Try es.io.read_labeled_shape(path, repair=["auto"]), which repairs the labels too, '
+                "or --repair auto on the command line."
+            )
+            raise InvalidShapeError(str(error).replace(try_auto(), remedy)) from error

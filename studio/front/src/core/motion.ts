@@ -39,10 +39,20 @@ export class Motion {
       } else if (handle?.type === "translation") direction.set(...handle.vector);
       else if (handle) direction.set(...handle.factors).subScalar(1);
     });
-    this.blend.value = 0;
-    // A shape at rest is drawn without what only a motion needs.
-    const moving = this.n_moving.value ? 1 : undefined;
-    for (const material of this.materials) define(material, "MOVING", moving);
+    // A shape is drawn without what its motion does not need.
+    this.define("MOVING", this.n_moving.value > 0);
+    this.define("TURNING", handles.some((handle) => handle?.type === "rotation"));
+    this.fade(0);
+  }
+
+  /** Blend so much of the exact result in, from 0 to 1. */
+  fade(share: number): void {
+    this.blend.value = share;
+    this.define("BLENDING", share > 0);
+  }
+
+  private define(name: string, holds: boolean): void {
+    for (const material of this.materials) define(material, name, holds ? 1 : undefined);
   }
 
   /** Cut off what lies beyond a plane, or nothing. */

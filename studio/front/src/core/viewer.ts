@@ -217,13 +217,13 @@ export class Viewer {
 
   /** Blend the exact result of the present motion in. */
   setExact(vertices: Float32Array): void {
-    const { blend } = this.motion;
     this.surface.setExact(vertices);
     const begin = performance.now();
     const step = () => {
-      blend.value = Math.min((performance.now() - begin) / FADE, 1);
+      const share = Math.min((performance.now() - begin) / FADE, 1);
+      this.motion.fade(share);
       this.invalidate();
-      if (blend.value < 1) this.fading = requestAnimationFrame(step);
+      if (share < 1) this.fading = requestAnimationFrame(step);
     };
     cancelAnimationFrame(this.fading);
     step();

@@ -2,16 +2,20 @@
 // by exp(share * log r) (Rodrigues' formula), so a twist does not pinch. `blend` fades to `exact`,
 // the result of the server.
 #define REGIONS 4
+// TURNING is defined while a region rotates, BLENDING while the exact result is seen: in software,
+// what is not needed takes a fifth of a frame also behind a branch that is not taken.
 #ifdef MOVING
 in vec4 shares;
-in vec3 exact;
-in vec3 exact_normal;
 uniform int n_moving;            // regions beyond are at rest
 uniform int kind[REGIONS];       // 0: at rest, 1: rotation, 2: translation, 3: scaling
 uniform vec3 pivot[REGIONS];
 uniform vec3 direction[REGIONS]; // unit axis, vector of the translation, or factors less 1
 uniform float angle[REGIONS];
+#ifdef BLENDING
+in vec3 exact;
+in vec3 exact_normal;
 uniform float blend;
+#endif
 
 const float PI = 3.14159265;
 
@@ -35,16 +39,22 @@ vec3 moved(out vec3 turn) {
   vec3 place = position;
   turn = vec3(0.0);
   for (int r = 0; r < n_moving; r++) {
+#ifdef TURNING
     if (kind[r] == 1) {
       place += across(direction[r], shares[r] * angle[r], position - pivot[r]);
       turn += shares[r] * angle[r] * direction[r];
-    } else if (kind[r] == 2) {
+    }
+#endif
+    if (kind[r] == 2) {
       place += shares[r] * direction[r];
     } else if (kind[r] == 3) {
       place += shares[r] * direction[r] * (position - pivot[r]);
     }
   }
-  return mix(place, exact, blend);
+#ifdef BLENDING
+  place = mix(place, exact, blend);
+#endif
+  return place;
 }
 
 vec3 turned(vec3 vector, vec3 turn) {
@@ -54,7 +64,14 @@ vec3 turned(vec3 vector, vec3 turn) {
 
 // The normal of this vertex, after the turn of `moved`.
 vec3 moved_normal(vec3 turn) {
-  return mix(turned(normal, turn), exact_normal, blend);
+  vec3 there = normal;
+#ifdef TURNING
+  there = turned(normal, turn);
+#endif
+#ifdef BLENDING
+  there = mix(there, exact_normal, blend);
+#endif
+  return there;
 }
 #else
 vec3 moved(out vec3 turn) {
