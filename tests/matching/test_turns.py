@@ -10,13 +10,14 @@ from scipy.spatial.transform import Rotation
 
 import eigenshape as es
 from certeig.kit.errors import InvalidParameterError
+from eigenshape.geometry.resolution.subdivision import split_long_edges
 from eigenshape.matching.evidence import FittedMap
 from eigenshape.matching.fitting import Fit, plan_fit
 from eigenshape.matching.growth import most_rigid_first
 from eigenshape.matching.match import match_shapes
 from eigenshape.matching.pairs import Pairs
 from eigenshape.matching.surface import describe_surface
-from eigenshape.matching.turns import is_rigid, rolled_turns, settle_map
+from eigenshape.matching.turns import is_rigid, rolled_turns, settle_map, turned_fit
 
 TURN = Rotation.from_rotvec([0.4, 1.0, 2.0]).as_matrix()
 
@@ -53,6 +54,36 @@ def test_a_map_of_a_copy_settles_in_the_turn_that_made_it():
     assert np.allclose(turn.rotation, TURN.T, atol=1e-6)
     assert turn.gap < 1e-6
     assert is_rigid(plan, turn)
+
+
+def test_a_finer_copy_of_long_thin_triangles_is_rigid():
+    # A slab between two outlines of 60 points, which a zigzag from side to side closes above and below
+    n = 60
+    angles = 2 * np.pi * np.arange(n) / n
+    radii = 1 + 0.3 * np.cos(2 * angles + 0.4) + 0.15 * np.cos(3 * angles)
+    above = np.column_stack([radii * np.cos(angles), radii * np.sin(angles), np.full(n, 0.2)])
+    low, high = np.arange(n // 2 - 1), n - 1 - np.arange(n // 2 - 1)
+    zigzag = np.concatenate(
+        [np.column_stack([low, low + 1, high]), np.column_stack([low + 1, high - 1, high])[:-1]]
+    )
+    here, ahead = np.arange(n), np.roll(np.arange(n), -1)
+    walls = [
+        np.column_stack([here + n, ahead + n, here]),
+        np.column_stack([ahead + n, ahead, here]),
+    ]
+    points = np.concatenate([above, above * [1, 1, -1]])
+    slab = es.TriangleMesh(points, np.concatenate([zigzag, zigzag[:, ::-1] + n, *walls]))
+    fine = es.geometry.subdivide(es.geometry.subdivide(slab))
+    whole = split_long_edges(slab, 0.3 * float(np.sqrt(es.geometry.surface_area(slab))), 500)[0]
+    plan = plan_of(turned(fine), whole)
+    turn = settle_map(plan, cKDTree(whole.vertices).query(fine.vertices)[1])
+    assert turn.exact
+    assert is_rigid(plan, turn)
+    fit = turned_fit(plan, turn)
+    # The corners of the slab come first in both.
+    away = fit.points[: 2 * n] - plan.whole.mesh.vertices[: 2 * n]
+    assert np.linalg.norm(away, axis=1).mean() < 0.01
+    assert fit.misfit < 1.5 * turn.gap
 
 
 def test_the_best_roll_of_a_wrong_one_is_the_true_turn():
