@@ -121,10 +121,12 @@ def analyze_pattern(pattern: sp.csc_array) -> Elimination:
     last_child[parents[parents >= 0]] = by_parent[parents >= 0]  # the last of several stays
 
     # The lower triangle by columns, in the order of elimination.
-    columns, lower_rows = np.repeat(place, np.diff(indptr)), place[indices]
-    source = np.flatnonzero(lower_rows >= columns)
-    source = source[np.argsort(columns[source], kind="stable")]
-    lower_ptr = np.concatenate([[0], np.cumsum(np.bincount(columns[source], minlength=n))])
+    sizes = np.diff(indptr)[order]
+    ends = np.cumsum(sizes)
+    source = np.arange(len(indices)) + np.repeat(indptr[order] - ends + sizes, sizes)
+    columns, lower_rows = np.repeat(np.arange(n), sizes), place[indices[source]]
+    lower = np.flatnonzero(lower_rows >= columns)
+    lower_ptr = np.searchsorted(columns[lower], np.arange(n + 1))
 
     places = _panel_places(widths, heights)
     tasks = divide_fronts(first, begins, rows, above, places)
@@ -144,8 +146,8 @@ def analyze_pattern(pattern: sp.csc_array) -> Elimination:
         tallest=int(heights.max()),
         lengths=_count_roundings(widths, heights, above),
         lower_ptr=lower_ptr,
-        lower_rows=lower_rows[source],
-        source=source,
+        lower_rows=lower_rows[lower],
+        source=source[lower],
     )
 
 
