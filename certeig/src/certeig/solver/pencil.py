@@ -280,8 +280,9 @@ def _exponent(matrix: sp.sparray) -> int:
 def _scale(matrix: sp.sparray, exponent: int) -> sp.csc_array:
     # The rows of a symmetric matrix serve as columns. Short indices take half of the memory.
     columns = sp.csc_array(matrix.T if matrix.format == "csr" else matrix)
-    short = np.int32 if columns.nnz <= np.iinfo(np.int32).max else np.int64
-    places = columns.indices.astype(short), columns.indptr.astype(short)
+    short = sp.get_index_dtype(maxval=columns.nnz)
+    copy = not columns.has_canonical_format  # or else nothing below changes the indices
+    places = (each.astype(short, copy=copy) for each in (columns.indices, columns.indptr))
     data = np.ldexp(columns.data.astype(np.float64), exponent)
     scaled = sp.csc_array((data, *places), shape=columns.shape)
     scaled.sum_duplicates()

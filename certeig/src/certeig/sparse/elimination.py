@@ -82,14 +82,14 @@ def analyze_pattern(pattern: sp.csc_array) -> Elimination:
     indptr, indices = pattern.indptr.astype(np.int64), pattern.indices.astype(np.int64)
     order = _order_points(indptr, indices)
     parent = _unknown(n)  # of each column of the factor; -1 at a root
-    symbolic.find_parents(indptr, indices, order, _inverse(order), parent, _unknown(n))
+    symbolic.find_parents(indptr, indices, order, np.argsort(order), parent, _unknown(n))
 
     # Renumber the columns by a postorder, so that supernodes are runs of columns.
     post = np.empty(n, dtype=np.int64)
     symbolic.postorder(parent, _unknown(n), _unknown(n), np.empty_like(post), post)
     order = order[post]
-    parent = np.where(parent[post] >= 0, _inverse(post)[parent[post]], -1)
-    place = _inverse(order)
+    parent = np.where(parent[post] >= 0, np.argsort(post)[parent[post]], -1)
+    place = np.argsort(order)
 
     # In a supernode each column is the parent of the one before, with the same entries below. Each
     # is a front, or several are joined to one.
@@ -182,12 +182,6 @@ def _order_points(indptr: Indices, indices: Indices) -> Indices:
 def _unknown(n: int) -> Indices:
     """Return an array of n times -1."""
     return np.full(n, -1, dtype=np.int64)
-
-
-def _inverse(order: Indices) -> Indices:
-    place = np.empty_like(order)
-    place[order] = np.arange(len(order))
-    return place
 
 
 def _panel_places(widths: Indices, heights: Indices) -> Indices:
