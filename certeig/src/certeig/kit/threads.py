@@ -141,6 +141,10 @@ class SpareMemory(Generic[R]):
         yield memory
         self._spare.append(memory)
 
+    def release(self) -> None:
+        """Give back to the system what is spare."""
+        self._spare.clear()
+
 
 class _SharedWork(Generic[A, R]):
     """Items that several threads take one after the other until none is left."""

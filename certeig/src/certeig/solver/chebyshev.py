@@ -12,7 +12,7 @@ from jaxtyping import Float, Int
 
 from certeig.kit.arrays import record
 from certeig.kit.errors import ConvergenceError
-from certeig.solver.pencil import Pencil
+from certeig.solver.pencil import Pencil, column_chunks
 from certeig.sparse.basis import Block, SparseRows, multiply, sparse_rows
 
 Column = Float[np.ndarray, " n"]
@@ -114,11 +114,11 @@ class ChebyshevFilter:
         return (vectors * self.roots)[self.order]
 
     def leave(self, vectors: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
-        """Return φ for u, in the order of the points."""
-        points = np.empty_like(vectors)
-        points[self.order] = vectors
-        points /= self.roots
-        return points
+        """Return φ for u, in the order of the points, in its place."""
+        rows = np.argsort(self.order)
+        for columns in column_chunks(vectors.shape[1]):
+            vectors[:, columns] = vectors[rows, columns] / self.roots
+        return vectors
 
     def values(
         self, thetas: Float[np.ndarray, " m"]

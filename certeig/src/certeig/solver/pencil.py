@@ -25,6 +25,8 @@ WIDEST_RANGE = 1e140
 # If trace W / trace B exceeds the median of W_ii/B_ii by this factor, the median is the pencil's
 # level: a few points must not set the unit of all tolerances.
 LARGEST_LEVEL_RATIO = 1e11
+# What an entry of the pattern of a shift belongs to, as bits of a code.
+DIAGONAL, IN_STIFFNESS, IN_MASS = 1, 2, 4
 ADVICE = Advice()
 
 
@@ -278,8 +280,9 @@ def _exponent(matrix: sp.sparray) -> int:
 def _scale(matrix: sp.sparray, exponent: int) -> sp.csc_array:
     # The rows of a symmetric matrix serve as columns. Short indices take half of the memory.
     columns = sp.csc_array(matrix.T if matrix.format == "csr" else matrix)
-    short = np.int32 if columns.nnz <= np.iinfo(np.int32).max else np.int64
-    places = columns.indices.astype(short), columns.indptr.astype(short)
+    short = sp.get_index_dtype(maxval=columns.nnz)
+    copy = not columns.has_canonical_format  # or else nothing below changes the indices
+    places = (each.astype(short, copy=copy) for each in (columns.indices, columns.indptr))
     data = np.ldexp(columns.data.astype(np.float64), exponent)
     scaled = sp.csc_array((data, *places), shape=columns.shape)
     scaled.sum_duplicates()
@@ -287,36 +290,29 @@ def _scale(matrix: sp.sparray, exponent: int) -> sp.csc_array:
 
 
 def _shift_pattern(stiffness: sp.csc_array, mass: sp.csc_array) -> ShiftPattern:
-    # The sum of ones has an entry wherever W, B or the diagonal has one.
-    union = sp.eye_array(stiffness.shape[0], dtype=np.int8, format="csc")
-    for matrix in (stiffness, mass):
-        ones = np.ones(matrix.nnz, dtype=np.int8), matrix.indices, matrix.indptr
-        union = union + sp.csc_array(ones, shape=matrix.shape)
+    # The sum of codes has an entry wherever W, B or the diagonal has one, and says which have.
+    union = sp.eye_array(stiffness.shape[0], dtype=np.int8, format="csc")  # DIAGONAL is 1
+    for code, matrix in ((IN_STIFFNESS, stiffness), (IN_MASS, mass)):
+        codes = np.full(matrix.nnz, code, np.int8), matrix.indices, matrix.indptr
+        union = union + sp.csc_array(codes, shape=matrix.shape)
     union.sort_indices()
-    keys = _keys(union)
-    diagonal = np.searchsorted(keys, np.arange(union.shape[1]) * (union.shape[1] + 1))
     elimination = analyze_pattern(union)
     return ShiftPattern(
         elimination=elimination,
-        stiffness=_scatter(stiffness, keys),
-        mass=_scatter(mass, keys),
-        diagonal=diagonal,
+        stiffness=_scatter(stiffness, union.data & IN_STIFFNESS),
+        mass=_scatter(mass, union.data & IN_MASS),
+        diagonal=np.flatnonzero(union.data & DIAGONAL),
         memory=factor_memory(elimination),
     )
 
 
-def _scatter(matrix: sp.csc_array, keys: Int[np.ndarray, " e"]) -> Float[np.ndarray, " e"]:
-    if matrix.nnz == len(keys):
+def _scatter(matrix: sp.csc_array, places: Int[np.ndarray, " e"]) -> Float[np.ndarray, " e"]:
+    """Return the entries of a matrix at the places that are not 0, and zeros at the others."""
+    if matrix.nnz == len(places):
         return matrix.data
-    data = np.zeros(len(keys))
-    data[np.searchsorted(keys, _keys(matrix))] = matrix.data
+    data = np.zeros(len(places))
+    data[places != 0] = matrix.data
     return data
-
-
-def _keys(matrix: sp.csc_array) -> Int[np.ndarray, " e"]:
-    """Return the place of each entry in a full matrix, ascending if indices are sorted."""
-    n = matrix.shape[1]
-    return np.repeat(np.arange(n) * n, np.diff(matrix.indptr)) + matrix.indices
 
 
 def _mass_floor(

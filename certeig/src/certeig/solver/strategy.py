@@ -155,6 +155,7 @@ def _solve_sparse(
         if heavy:
             n_certified = max(k, factor.count)
             n_sought = min(n_certified + 1, pencil.n)
+        pencil.shift_pattern.memory.release()  # the Krylov space takes its place
         wanted = Wanted(below=factor.count, above=n_sought - factor.count)
         none = np.empty((pencil.n, 0))
         _, vectors = block_lanczos(pencil, factor, wanted, locked=none, report=_in_run(report, 0))

@@ -82,14 +82,14 @@ def analyze_pattern(pattern: sp.csc_array) -> Elimination:
     indptr, indices = pattern.indptr.astype(np.int64), pattern.indices.astype(np.int64)
     order = _order_points(indptr, indices)
     parent = _unknown(n)  # of each column of the factor; -1 at a root
-    symbolic.find_parents(indptr, indices, order, _inverse(order), parent, _unknown(n))
+    symbolic.find_parents(indptr, indices, order, np.argsort(order), parent, _unknown(n))
 
     # Renumber the columns by a postorder, so that supernodes are runs of columns.
     post = np.empty(n, dtype=np.int64)
     symbolic.postorder(parent, _unknown(n), _unknown(n), np.empty_like(post), post)
     order = order[post]
-    parent = np.where(parent[post] >= 0, _inverse(post)[parent[post]], -1)
-    place = _inverse(order)
+    parent = np.where(parent[post] >= 0, np.argsort(post)[parent[post]], -1)
+    place = np.argsort(order)
 
     # In a supernode each column is the parent of the one before, with the same entries below. Each
     # is a front, or several are joined to one.
@@ -121,10 +121,12 @@ def analyze_pattern(pattern: sp.csc_array) -> Elimination:
     last_child[parents[parents >= 0]] = by_parent[parents >= 0]  # the last of several stays
 
     # The lower triangle by columns, in the order of elimination.
-    columns, lower_rows = np.repeat(place, np.diff(indptr)), place[indices]
-    source = np.flatnonzero(lower_rows >= columns)
-    source = source[np.argsort(columns[source], kind="stable")]
-    lower_ptr = np.concatenate([[0], np.cumsum(np.bincount(columns[source], minlength=n))])
+    sizes = np.diff(indptr)[order]
+    ends = np.cumsum(sizes)
+    source = np.arange(len(indices)) + np.repeat(indptr[order] - ends + sizes, sizes)
+    columns, lower_rows = np.repeat(np.arange(n), sizes), place[indices[source]]
+    lower = np.flatnonzero(lower_rows >= columns)
+    lower_ptr = np.searchsorted(columns[lower], np.arange(n + 1))
 
     places = _panel_places(widths, heights)
     tasks = divide_fronts(first, begins, rows, above, places)
@@ -144,8 +146,8 @@ def analyze_pattern(pattern: sp.csc_array) -> Elimination:
         tallest=int(heights.max()),
         lengths=_count_roundings(widths, heights, above),
         lower_ptr=lower_ptr,
-        lower_rows=lower_rows[source],
-        source=source,
+        lower_rows=lower_rows[lower],
+        source=source[lower],
     )
 
 
@@ -180,12 +182,6 @@ def _order_points(indptr: Indices, indices: Indices) -> Indices:
 def _unknown(n: int) -> Indices:
     """Return an array of n times -1."""
     return np.full(n, -1, dtype=np.int64)
-
-
-def _inverse(order: Indices) -> Indices:
-    place = np.empty_like(order)
-    place[order] = np.arange(len(order))
-    return place
 
 
 def _panel_places(widths: Indices, heights: Indices) -> Indices:

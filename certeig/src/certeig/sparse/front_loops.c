@@ -2,9 +2,10 @@
 #include "sparse/dense.h"
 
 enum {
-    SMALL = 40, /* rows of a front up to which plain loops are faster (measured) */
-    NEAR = 32,  /* rows of a panel that fit into the first-level cache */
-    SOON = 64,  /* cache lines of the next panel that are asked for ahead (measured) */
+    SMALL = 40,   /* rows of a front up to which plain loops are faster (measured) */
+    NEAR = 32,    /* rows of a panel that fit into the first-level cache */
+    AFTER = 1024, /* numbers of L beyond those in use that memory is asked for (measured) */
+    SOON = 64,    /* cache lines of the next panel that are asked for ahead (measured) */
 };
 
 /* Numbers in the lower triangle of a matrix. */
@@ -103,6 +104,11 @@ struct tasks {
     const int64_t *fronts, *rows, *own_rows, *fetches, *fetched, *to;
 };
 
+/* Ask memory for so many numbers. Solves wait for it: they use each number of L eight times. */
+static inline void fetch_numbers(const double *begin, int64_t count) {
+    for (int64_t at = 0; at < count; at += LANES) fetch(begin + at);
+}
+
 /* Solve with the panels of one front: its own columns, then what these add to the rows below. */
 static void solve_front(const struct tree *tree, const int64_t *rows, const double *panel,
                         eight *lanes, eight *gathered, int64_t s) {
@@ -115,9 +121,11 @@ static void solve_front(const struct tree *tree, const int64_t *rows, const doub
         for (int64_t i = 1; i < columns; i++)
             subtract_sums(1, panel + i * columns, 1, 0, lanes + mine, i, lanes + mine + i);
         panel += columns * columns;
-        for (int64_t i = 0; i < four; i += 4)
+        for (int64_t i = 0; i < four; i += 4) {
+            fetch_numbers(panel + i * columns + AFTER, 4 * columns);
             write_negative_sums(4, panel + i * columns, 1, columns, lanes + mine, columns,
                                 gathered + i);
+        }
         for (int64_t i = four; i < rest; i++)
             write_negative_sums(1, panel + i * columns, 1, 0, lanes + mine, columns, gathered + i);
         for (int64_t i = 0; i < rest; i++) lanes[rows[below + i]] += gathered[i];
@@ -148,8 +156,11 @@ static void subtract_below(const double *panel, int64_t columns, const eight *ga
     for (int64_t low = 0; low < rest; low += NEAR) {
         int64_t count = lesser(NEAR, rest - low);
         const double *corner = panel + low * columns;
-        for (int64_t j = 0; j < four; j += 4)
+        const double *next = corner + NEAR * columns;
+        for (int64_t j = 0; j < four; j += 4) {
+            fetch_numbers(next + j * NEAR, 4 * NEAR);
             subtract_sums(4, corner + j, columns, 1, gathered + low, count, own + j);
+        }
         for (int64_t j = four; j < columns; j++)
             subtract_sums(1, corner + j, columns, 0, gathered + low, count, own + j);
     }

@@ -211,6 +211,11 @@ class FactorMemory:
     updates: SpareMemory[Updates]
     rooms: SpareMemory[Room]
 
+    def release(self) -> None:
+        """Give the memory back to the system; the next factor makes it anew."""
+        self.updates.release()
+        self.rooms.release()
+
 
 def factor_memory(elimination: Elimination) -> FactorMemory:
     """Return memory for factors of a pattern; nothing is allocated before the first."""

@@ -135,14 +135,15 @@ def kernel_laplacian(
         )
     # The entries w_i w_j exp(-d_ij²/4t).
     if mesh is None:
-        starts = np.concatenate([[0], np.cumsum(counts)])
+        starts = np.append(0, np.cumsum(counts))
         columns, values = gaussian_rows(grid, weights, t, starts)
+        # SciPy gives indices and pointers one type, the longer one.
+        starts = starts.astype(sp.get_index_dtype(maxval=starts[-1]))
         matrix = sp.csr_array((values, columns, starts), shape=(n, n))
     else:
-        rows = np.repeat(np.arange(n), n_partners)
         heat = np.exp(-((matrix.data / kernel.width) ** 2))
-        matrix.data = weights[rows] * weights[matrix.indices] * heat
-        matrix = (matrix + sp.diags_array(weights**2)).tocsr()
+        matrix.data = np.repeat(weights, n_partners) * weights[matrix.indices] * heat
+        matrix = matrix + sp.diags_array(weights**2)
     # W is written in the place of the matrix. Weights and coordinates were divided by powers of two.
     of_weight, of_length = (int(np.frexp(each)[1]) - 1 for each in (unit, scale))
     t = float(np.ldexp(kernel.t, -2 * of_length))
