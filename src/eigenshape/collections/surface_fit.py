@@ -1,6 +1,6 @@
 """One surface bent onto another by stiff, smooth displacements, from coarse to fine."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from typing import Literal, NamedTuple, TypeAlias
@@ -8,6 +8,7 @@ from typing import Literal, NamedTuple, TypeAlias
 import numpy as np
 from jaxtyping import Float, Int
 from scipy.linalg import solve
+from scipy.linalg.blas import dsyrk
 
 from certeig.kit.arrays import ReadOnly, record
 from certeig.kit.errors import CerteigError
@@ -60,6 +61,7 @@ LEVELS: Levels = (
 # Share of a gap along the surface that counts: nearest points slide wrongly more often than rightly.
 SLIDE = 0.2
 SPACING = 0.7  # of centers of displacements, in widths
+POINTS_AT_ONCE = 250  # whose kernels are computed; more leave the cache, and take longer
 FAR = 0.05  # gap at which the confidence is at most a quarter
 ON_RIM = 1e-9  # weight of inner vertices below which a point lies on the boundary of a surface
 UNMATCHED = 0.1  # distance from which a point has no counterpart
@@ -294,14 +296,17 @@ def bend_onto(
             # Pairs of one point are summed before the kernels are multiplied.
             total = np.bincount(start, weights, n_points)
             pull = np.column_stack([np.bincount(start, wanted[:, i], n_points) for i in range(3)])
-            at_points = _kernel(points, centers, width)
             at_centers = _kernel(centers, centers, width)
-            energy = stiffness * len(start) * at_centers
-            weighted = at_points * np.sqrt(total)[:, None]
-            system = weighted.T @ weighted + energy  # NumPy computes half of such a product
+            system = (stiffness * len(start) * at_centers).T  # in the order of columns, for BLAS
+            sides, roots = np.zeros_like(centers), np.sqrt(total)[:, None]
+            for some, near in _kernel_blocks(points, centers, width):
+                sides += near.T @ pull[some]
+                near *= roots[some]
+                system = dsyrk(1.0, near.T, beta=1.0, c=system, overwrite_c=True)  # its upper half
             system[np.diag_indices_from(system)] += 1e-6
-            shifts = solve(system, at_points.T @ pull, assume_a="pos", overwrite_a=True)
-            vertices = vertices + _kernel(vertices, centers, width) @ shifts
+            shifts = solve(system, sides, assume_a="pos", overwrite_a=True)
+            for some, near in _kernel_blocks(vertices, centers, width):
+                vertices[some] += near @ shifts
             points = np.einsum("pc,pcd->pd", shares, vertices[faces])
             centers = centers + at_centers @ shifts
 
@@ -354,6 +359,15 @@ def _stretches(
     degrees = np.bincount(edges.ravel(), minlength=len(vertices))
     squares = np.bincount(edges.ravel(), np.repeat(stretch**2, 2), len(vertices))
     return edges, stretch, np.sqrt(squares / np.maximum(degrees, 1))
+
+
+def _kernel_blocks(
+    points: Float[np.ndarray, "k 3"], centers: Float[np.ndarray, "m 3"], width: float
+) -> Iterator[tuple[slice, Float[np.ndarray, "b m"]]]:
+    """Yield the kernels of some points at a time: those of all would not fit the cache."""
+    for first in range(0, len(points), POINTS_AT_ONCE):
+        some = slice(first, first + POINTS_AT_ONCE)
+        yield some, _kernel(points[some], centers, width)
 
 
 def _kernel(
