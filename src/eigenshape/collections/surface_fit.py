@@ -1,6 +1,6 @@
 """One surface bent onto another by stiff, smooth displacements, from coarse to fine."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from typing import Literal, NamedTuple, TypeAlias
@@ -15,7 +15,7 @@ from certeig.kit.errors import CerteigError
 from certeig.kit.threads import one_blas_thread
 from eigenshape._corners import mean_normals
 from eigenshape._errors import InvalidShapeError
-from eigenshape._vectors import area_vectors, mean_radius, unit_vectors
+from eigenshape._vectors import area_vectors, mean_radius, row_dots, sum_rows, unit_vectors
 from eigenshape.collections.alignment import (
     MIRROR,
     ON_SURFACE,
@@ -274,7 +274,7 @@ def bend_onto(
     for width, reach, stiffness, n_rounds, n_points in levels:
         places, theirs = samples[n_points]
         faces, shares = placed.faces[places.simplices], places.weights
-        ends, end_normals = (theirs.points - middle) / size, theirs.normals
+        ends = (theirs.points - middle) / size
         points = np.einsum("pc,pcd->pd", shares, vertices[faces])
         # One center in each cell of a grid, at the first of the points in it
         cells = np.floor(points / (SPACING * width)).astype(np.int64)
@@ -284,29 +284,22 @@ def bend_onto(
             normals = unit_vectors(area_vectors(vertices[faces]))
             with_normals = join_normals(points, normals, NORMAL_WEIGHT)
             pairing = pairing or Pairing(
-                with_normals, join_normals(ends, end_normals, NORMAL_WEIGHT)
+                with_normals, join_normals(ends, theirs.normals, NORMAL_WEIGHT)
             )
             start, end, distances = pairing.pair(with_normals)
-            facing = end_normals[end]
+            facing = theirs.normals[end]
             weights = (1 + (distances / reach) ** 2) ** -2
-            weights *= np.clip(np.einsum("pi,pi->p", normals[start], facing), 0, 1)
+            weights *= np.clip(row_dots(normals[start], facing), 0, 1)
             gaps = ends[end] - points[start]
-            along = np.einsum("pi,pi->p", gaps, facing)[:, None] * facing
+            along = row_dots(gaps, facing)[:, None] * facing
             wanted = weights[:, None] * (along + SLIDE * (gaps - along))
             # Pairs of one point are summed before the kernels are multiplied.
-            total = np.bincount(start, weights, n_points)
-            pull = np.column_stack([np.bincount(start, wanted[:, i], n_points) for i in range(3)])
+            pull = sum_rows(start, np.column_stack([weights, wanted]), n_points)
             at_centers = _kernel(centers, centers, width)
-            system = (stiffness * len(start) * at_centers).T  # in the order of columns, for BLAS
-            sides, roots = np.zeros_like(centers), np.sqrt(total)[:, None]
-            for some, near in _kernel_blocks(points, centers, width):
-                sides += near.T @ pull[some]
-                near *= roots[some]
-                system = dsyrk(1.0, near.T, beta=1.0, c=system, overwrite_c=True)  # its upper half
-            system[np.diag_indices_from(system)] += 1e-6
-            shifts = solve(system, sides, assume_a="pos", overwrite_a=True)
-            for some, near in _kernel_blocks(vertices, centers, width):
-                vertices[some] += near @ shifts
+            energy = stiffness * len(start) * at_centers
+            shifts = _solve_shifts(points, centers, width, energy, pull)
+            for some in _blocks(len(vertices)):
+                vertices[some] += _kernel(vertices[some], centers, width) @ shifts
             points = np.einsum("pc,pcd->pd", shares, vertices[faces])
             centers = centers + at_centers @ shifts
 
@@ -316,7 +309,7 @@ def bend_onto(
     nearest = closest_points(target, moved)
     gaps = np.linalg.norm(nearest.points - moved, axis=1)
     normals = unit_vectors(area_vectors(target.vertices[target.faces[nearest.simplices]]))
-    cosines = np.einsum("ni,ni->n", mean_normals(bent), normals)
+    cosines = row_dots(mean_normals(bent), normals)
     # What is nearest to a boundary is beyond it.
     inside = ~np.isin(np.arange(target.n_vertices), boundary_vertices(target))
     beyond = np.sum(nearest.weights * inside[target.faces[nearest.simplices]], axis=1) < ON_RIM
@@ -349,7 +342,7 @@ def _stretches(
     """
     edges = edge_table(source).edges
     before, after = (
-        np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
+        np.linalg.norm(np.subtract(*points[edges.T]), axis=1)
         for points in (source.vertices, vertices)
     )
     known = (before > 0) & (after > 0)
@@ -361,13 +354,27 @@ def _stretches(
     return edges, stretch, np.sqrt(squares / np.maximum(degrees, 1))
 
 
-def _kernel_blocks(
-    points: Float[np.ndarray, "k 3"], centers: Float[np.ndarray, "m 3"], width: float
-) -> Iterator[tuple[slice, Float[np.ndarray, "b m"]]]:
-    """Yield the kernels of some points at a time: those of all would not fit the cache."""
-    for first in range(0, len(points), POINTS_AT_ONCE):
-        some = slice(first, first + POINTS_AT_ONCE)
-        yield some, _kernel(points[some], centers, width)
+def _solve_shifts(
+    points: Float[np.ndarray, "k 3"],
+    centers: Float[np.ndarray, "m 3"],
+    width: float,
+    energy: Float[np.ndarray, "m m"],
+    pull: Float[np.ndarray, "k 4"],
+) -> Float[np.ndarray, "m 3"]:
+    """Return the shifts of centers, given the weight of each point and the weighted pull on it."""
+    system, sides = energy.T, np.zeros_like(centers)  # columns in a row, as BLAS has them
+    for some in _blocks(len(points)):
+        near = _kernel(points[some], centers, width)
+        sides += near.T @ pull[some, 1:]
+        near *= np.sqrt(pull[some, :1])
+        system = dsyrk(1.0, near.T, 1.0, system, overwrite_c=True)  # the upper half
+    system[np.diag_indices_from(system)] += 1e-6
+    return solve(system, sides, assume_a="pos", overwrite_a=True)
+
+
+def _blocks(count: int) -> list[Int[np.ndarray, " b"]]:
+    """Divide points into blocks whose kernels stay in the cache."""
+    return np.array_split(np.arange(count), count // POINTS_AT_ONCE + 1)
 
 
 def _kernel(
