@@ -34,7 +34,9 @@ def test_each_node_is_halved_where_it_is_longest(n_rows, n_values):
     width = leaves
     while width > 1:
         for leaf in range(0, leaves, width):
-            first, middle, end = ((leaf + part) * n_rows // leaves for part in (0, width // 2, width))
+            first, middle, end = (
+                (leaf + part) * n_rows // leaves for part in (0, width // 2, width)
+            )
             block = rows[tree.order[first:end]]
             axis = np.ptp(block, axis=0).argmax()
             low, high = block[: middle - first, axis], block[middle - first :, axis]
