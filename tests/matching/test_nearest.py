@@ -24,6 +24,26 @@ def test_no_row_is_nearer(n_rows):
     assert np.array_equal(wrong, kept)
 
 
+@pytest.mark.parametrize("n_rows", [LEAF + 1, 5 * LEAF, 700])
+@pytest.mark.parametrize("n_values", [2, 1000])
+def test_each_node_is_halved_where_it_is_longest(n_rows, n_values):
+    rows = np.random.default_rng(n_rows).integers(0, n_values, (n_rows, 6)).astype(float)
+    tree = RowTree(rows)
+    assert np.array_equal(np.sort(tree.order), np.arange(n_rows))
+    leaves = 1 << tree.levels
+    width = leaves
+    while width > 1:
+        for leaf in range(0, leaves, width):
+            first, middle, end = (
+                (leaf + part) * n_rows // leaves for part in (0, width // 2, width)
+            )
+            block = rows[tree.order[first:end]]
+            axis = np.ptp(block, axis=0).argmax()
+            low, high = block[: middle - first, axis], block[middle - first :, axis]
+            assert low.max() <= high.min()
+        width //= 2
+
+
 def test_rows_that_move_are_found_where_they_are():
     draw = np.random.default_rng(0)
     rows, points = draw.standard_normal((2, 500, 6))

@@ -8,13 +8,14 @@ from typing import Literal, NamedTuple, TypeAlias
 import numpy as np
 from jaxtyping import Float, Int
 from scipy.linalg import solve
+from scipy.linalg.blas import dsyrk
 
 from certeig.kit.arrays import ReadOnly, record
 from certeig.kit.errors import CerteigError
 from certeig.kit.threads import one_blas_thread
 from eigenshape._corners import mean_normals
 from eigenshape._errors import InvalidShapeError
-from eigenshape._vectors import area_vectors, mean_radius, unit_vectors
+from eigenshape._vectors import area_vectors, mean_radius, row_dots, sum_rows, unit_vectors
 from eigenshape.collections.alignment import (
     MIRROR,
     ON_SURFACE,
@@ -60,6 +61,7 @@ LEVELS: Levels = (
 # Share of a gap along the surface that counts: nearest points slide wrongly more often than rightly.
 SLIDE = 0.2
 SPACING = 0.7  # of centers of displacements, in widths
+POINTS_AT_ONCE = 250  # whose kernels are computed; more leave the cache, and take longer
 FAR = 0.05  # gap at which the confidence is at most a quarter
 ON_RIM = 1e-9  # weight of inner vertices below which a point lies on the boundary of a surface
 UNMATCHED = 0.1  # distance from which a point has no counterpart
@@ -272,7 +274,7 @@ def bend_onto(
     for width, reach, stiffness, n_rounds, n_points in levels:
         places, theirs = samples[n_points]
         faces, shares = placed.faces[places.simplices], places.weights
-        ends, end_normals = (theirs.points - middle) / size, theirs.normals
+        ends = (theirs.points - middle) / size
         points = np.einsum("pc,pcd->pd", shares, vertices[faces])
         # One center in each cell of a grid, at the first of the points in it
         cells = np.floor(points / (SPACING * width)).astype(np.int64)
@@ -282,26 +284,22 @@ def bend_onto(
             normals = unit_vectors(area_vectors(vertices[faces]))
             with_normals = join_normals(points, normals, NORMAL_WEIGHT)
             pairing = pairing or Pairing(
-                with_normals, join_normals(ends, end_normals, NORMAL_WEIGHT)
+                with_normals, join_normals(ends, theirs.normals, NORMAL_WEIGHT)
             )
             start, end, distances = pairing.pair(with_normals)
-            facing = end_normals[end]
+            facing = theirs.normals[end]
             weights = (1 + (distances / reach) ** 2) ** -2
-            weights *= np.clip(np.einsum("pi,pi->p", normals[start], facing), 0, 1)
+            weights *= np.clip(row_dots(normals[start], facing), 0, 1)
             gaps = ends[end] - points[start]
-            along = np.einsum("pi,pi->p", gaps, facing)[:, None] * facing
+            along = row_dots(gaps, facing)[:, None] * facing
             wanted = weights[:, None] * (along + SLIDE * (gaps - along))
             # Pairs of one point are summed before the kernels are multiplied.
-            total = np.bincount(start, weights, n_points)
-            pull = np.column_stack([np.bincount(start, wanted[:, i], n_points) for i in range(3)])
-            at_points = _kernel(points, centers, width)
+            pull = sum_rows(start, np.column_stack([weights, wanted]), n_points)
             at_centers = _kernel(centers, centers, width)
             energy = stiffness * len(start) * at_centers
-            weighted = at_points * np.sqrt(total)[:, None]
-            system = weighted.T @ weighted + energy  # NumPy computes half of such a product
-            system[np.diag_indices_from(system)] += 1e-6
-            shifts = solve(system, at_points.T @ pull, assume_a="pos", overwrite_a=True)
-            vertices = vertices + _kernel(vertices, centers, width) @ shifts
+            shifts = _solve_shifts(points, centers, width, energy, pull)
+            for some in _blocks(len(vertices)):
+                vertices[some] += _kernel(vertices[some], centers, width) @ shifts
             points = np.einsum("pc,pcd->pd", shares, vertices[faces])
             centers = centers + at_centers @ shifts
 
@@ -311,7 +309,7 @@ def bend_onto(
     nearest = closest_points(target, moved)
     gaps = np.linalg.norm(nearest.points - moved, axis=1)
     normals = unit_vectors(area_vectors(target.vertices[target.faces[nearest.simplices]]))
-    cosines = np.einsum("ni,ni->n", mean_normals(bent), normals)
+    cosines = row_dots(mean_normals(bent), normals)
     # What is nearest to a boundary is beyond it.
     inside = ~np.isin(np.arange(target.n_vertices), boundary_vertices(target))
     beyond = np.sum(nearest.weights * inside[target.faces[nearest.simplices]], axis=1) < ON_RIM
@@ -344,7 +342,7 @@ def _stretches(
     """
     edges = edge_table(source).edges
     before, after = (
-        np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
+        np.linalg.norm(np.subtract(*points[edges.T]), axis=1)
         for points in (source.vertices, vertices)
     )
     known = (before > 0) & (after > 0)
@@ -354,6 +352,29 @@ def _stretches(
     degrees = np.bincount(edges.ravel(), minlength=len(vertices))
     squares = np.bincount(edges.ravel(), np.repeat(stretch**2, 2), len(vertices))
     return edges, stretch, np.sqrt(squares / np.maximum(degrees, 1))
+
+
+def _solve_shifts(
+    points: Float[np.ndarray, "k 3"],
+    centers: Float[np.ndarray, "m 3"],
+    width: float,
+    energy: Float[np.ndarray, "m m"],
+    pull: Float[np.ndarray, "k 4"],
+) -> Float[np.ndarray, "m 3"]:
+    """Return the shifts of centers, given the weight of each point and the weighted pull on it."""
+    system, sides = energy.T, np.zeros_like(centers)  # columns in a row, as BLAS has them
+    for some in _blocks(len(points)):
+        near = _kernel(points[some], centers, width)
+        sides += near.T @ pull[some, 1:]
+        near *= np.sqrt(pull[some, :1])
+        system = dsyrk(1.0, near.T, 1.0, system, overwrite_c=True)  # the upper half
+    system[np.diag_indices_from(system)] += 1e-6
+    return solve(system, sides, assume_a="pos", overwrite_a=True)
+
+
+def _blocks(count: int) -> list[Int[np.ndarray, " b"]]:
+    """Divide points into blocks whose kernels stay in the cache."""
+    return np.array_split(np.arange(count), count // POINTS_AT_ONCE + 1)
 
 
 def _kernel(

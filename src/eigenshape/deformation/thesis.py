@@ -10,6 +10,7 @@ from certeig.kit.arguments import require_type
 from certeig.kit.arrays import ReadOnly, record
 from certeig.kit.threads import one_blas_thread
 from eigenshape._corners import mean_normals
+from eigenshape._vectors import row_dots
 from eigenshape.deformation.binding import Binding
 from eigenshape.deformation.handles import Handle, affine_offset, require_handles
 from eigenshape.deformation.rig import eigen_skeleton, project_on_modes
@@ -179,7 +180,7 @@ def frame_details(faces: Int[np.ndarray, "f 3"], skeleton: Points, shape: Points
     ends = np.concatenate([edges, edges[:, ::-1]])
     arms = skeleton[ends[:, 1]] - skeleton[ends[:, 0]]
     lengths, normals = np.linalg.norm(arms, axis=1), mean_normals(mesh)[ends[:, 0]]
-    flat = np.linalg.norm(arms - np.einsum("ei,ei->e", arms, normals)[:, None] * normals, axis=1)
+    flat = np.linalg.norm(arms - row_dots(arms, normals)[:, None] * normals, axis=1)
     share = np.divide(flat, lengths, out=np.zeros_like(flat), where=lengths > 0)
     order = np.lexsort((share, ends[:, 0]))
     partner = np.empty(mesh.n_vertices, dtype=np.int64)
@@ -230,7 +231,7 @@ def _local_frames(
 ) -> tuple[Float[np.ndarray, "n 3 3"], Bool[np.ndarray, " n"]]:
     """Return the frame of each vertex, its axes as rows, and whether it exists."""
     normals, arms = mean_normals(skeleton), skeleton.vertices[partner] - skeleton.vertices
-    flat = arms - np.einsum("ni,ni->n", arms, normals)[:, None] * normals
+    flat = arms - row_dots(arms, normals)[:, None] * normals
     flat_lengths = np.linalg.norm(flat, axis=1, keepdims=True)
     arm_lengths = np.linalg.norm(arms, axis=1)
     has_frame = normals.any(axis=1) & (flat_lengths[:, 0] > LEAST_TANGENT * arm_lengths)

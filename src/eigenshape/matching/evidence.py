@@ -10,7 +10,7 @@ from scipy.special import expit
 
 from certeig.kit.arrays import TINY, record
 from eigenshape._corners import at_points
-from eigenshape._vectors import area_vectors, triangle_areas, unit_vectors
+from eigenshape._vectors import area_vectors, row_dots, triangle_areas, unit_vectors
 from eigenshape.geometry.measure import edge_lengths, face_areas
 from eigenshape.geometry.topology import edge_table, neighbor_links
 from eigenshape.matching.fitting import Fit
@@ -86,7 +86,7 @@ def signed_area_ratios(
     areas = triangle_areas(part.mesh.vertices[faces])
     moved = area_vectors(whole.mesh.vertices[places[faces]])
     normals = unit_vectors(whole.normals[places[faces]].sum(axis=1))
-    return np.clip(np.einsum("fi,fi->f", moved, normals) / np.maximum(areas, TINY), -1, 1)
+    return np.clip(row_dots(moved, normals) / np.maximum(areas, TINY), -1, 1)
 
 
 def rate_map(

@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape.matching.nearest_loops import fill_row_boxes, find_nearest_rows
+from eigenshape.matching.nearest_loops import fill_row_boxes, find_nearest_rows, order_rows
 
 LEAF = 32  # most rows of a leaf; with 8 or 16 a search is as long or longer
 
@@ -17,7 +17,8 @@ class RowTree:
 
     def __init__(self, rows: Float[np.ndarray, "n 6"]) -> None:
         self.levels = ((len(rows) - 1) // LEAF).bit_length()
-        self.order = _leaf_order(rows, self.levels)
+        self.order = np.empty(len(rows), np.int64)
+        order_rows(np.ascontiguousarray(rows), self.levels, self.order)
         self._places = np.argsort(self.order)
         self.move(rows)
 
@@ -35,20 +36,12 @@ class RowTree:
         shape = points.shape[:-1]
         found = np.zeros(shape, dtype=np.int64) if guess is None else self._places[guess]
         squares = np.empty(shape)
-        tree = self.ordered, self.levels, self.nodes
-        points = np.ascontiguousarray(points).reshape(-1, 6)
-        find_nearest_rows(points, *tree, found.reshape(-1), squares.reshape(-1))
+        find_nearest_rows(
+            np.ascontiguousarray(points).reshape(-1, 6),
+            self.ordered,
+            self.levels,
+            self.nodes,
+            found.reshape(-1),
+            squares.reshape(-1),
+        )
         return np.sqrt(squares), self.order[found]
-
-
-def _leaf_order(rows: Float[np.ndarray, "n 6"], levels: int) -> Int[np.ndarray, " n"]:
-    """Return the order in which rows of a leaf follow each other: each node is halved where it is longest."""
-    order, n, leaves = np.arange(len(rows)), len(rows), 1 << levels
-    for level in range(levels):
-        width = leaves >> level  # of a node, in leaves
-        for leaf in range(0, leaves, width):
-            first, middle, end = ((leaf + part) * n // leaves for part in (0, width // 2, width))
-            block = order[first:end]
-            axis = np.ptp(rows[block], axis=0).argmax()
-            order[first:end] = block[np.argpartition(rows[block, axis], middle - first)]
-    return order

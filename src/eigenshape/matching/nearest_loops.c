@@ -1,4 +1,4 @@
-/* The nearest of points with normals, and the boxes of their tree. Documented in nearest_loops.py. */
+/* The nearest of points with normals, and their tree. Documented in nearest_loops.py. */
 #include "matching/nearest.h"
 
 #include "space.h"
@@ -17,6 +17,57 @@ static double square_between(const double *a, const double *b) {
     double sum = 0;
     for (int axis = 0; axis < 6; axis++) sum += (a[axis] - b[axis]) * (a[axis] - b[axis]);
     return sum;
+}
+
+/* Put the numbers of rows that are lower along an axis than the one that belongs to a place before it, and
+   those that are higher behind (Hoare 1961, Algorithm 65: FIND). */
+static void select_row(const double (*rows)[6], int axis, int64_t *order, int64_t n,
+                       int64_t place) {
+    for (int64_t first = 0, last = n - 1; first < last;) {
+        double pivot = rows[order[place]][axis];
+        int64_t low = first, high = last;
+        while (low <= high) {
+            while (rows[order[low]][axis] < pivot) low++;
+            while (rows[order[high]][axis] > pivot) high--;
+            if (low > high) break;
+            int64_t row = order[low];
+            order[low++] = order[high];
+            order[high--] = row;
+        }
+        if (high < place) first = low;
+        if (low > place) last = high;
+    }
+}
+
+static int longest_axis(const double (*rows)[6], const int64_t *order, int64_t n) {
+    int longest = 0;
+    double most = -1;
+    for (int axis = 0; axis < 6; axis++) {
+        double low = INFINITE, high = -INFINITE;
+        for (int64_t i = 0; i < n; i++) {
+            low = minimum(low, rows[order[i]][axis]);
+            high = maximum(high, rows[order[i]][axis]);
+        }
+        if (high - low > most) {
+            most = high - low;
+            longest = axis;
+        }
+    }
+    return longest;
+}
+
+KERNEL void order_rows(const double (*rows)[6], int64_t levels, int64_t *order, int64_t n_rows) {
+    int64_t leaves = (int64_t)1 << levels;
+    for (int64_t row = 0; row < n_rows; row++) order[row] = row;
+    for (int64_t width = leaves; width > 1; width /= 2) { /* of a node, in leaves */
+        for (int64_t leaf = 0; leaf < leaves; leaf += width) {
+            int64_t first = first_of_leaf(leaf, n_rows, leaves);
+            int64_t middle = first_of_leaf(leaf + width / 2, n_rows, leaves);
+            int64_t end = first_of_leaf(leaf + width, n_rows, leaves);
+            int axis = longest_axis(rows, &order[first], end - first);
+            select_row(rows, axis, &order[first], end - first, middle - first);
+        }
+    }
 }
 
 /* From the leaves up: the least and the largest coordinates of each node. */

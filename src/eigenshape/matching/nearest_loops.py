@@ -1,4 +1,4 @@
-"""Kernels of `nearest`: the boxes of a tree of rows, and searches in it.
+"""Kernels of `nearest`: a tree of rows, and searches in it.
 
 A tree has 2^levels leaves; the children of node k are 2 k + 1 and 2 k + 2. Rows are in the order of its leaves.
 """
@@ -7,6 +7,13 @@ import numpy as np
 from jaxtyping import Float64, Int64
 
 from certeig.kit.kernels import Out, kernel
+
+
+@kernel("n_rows")
+def order_rows(
+    rows: Float64[np.ndarray, "n_rows 6"], levels: int, order: Out[Int64[np.ndarray, " n_rows"]]
+) -> None:
+    """Write the order in which rows of a leaf follow each other: each node is halved where it is longest."""
 
 
 @kernel("n_rows")

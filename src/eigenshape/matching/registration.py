@@ -14,7 +14,7 @@ from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike
 from eigenshape._arrays import finite_rows
 from eigenshape._corners import mean_normals
-from eigenshape._vectors import nearest_rotations
+from eigenshape._vectors import nearest_rotations, row_dots
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.orientation import orient_outward
@@ -287,7 +287,7 @@ def _find_motions(first: Scan, second: Scan, unit: float) -> list[Registration]:
             motion = fit_motion(starts[members], ends[members])
             near = np.linalg.norm(motion.move(starts) - ends, axis=1) < PAIR_REACH * unit
             turned = start_normals @ motion.rotation.T
-            near &= np.einsum("pi,pi->p", turned, end_normals) > FACING_COSINE
+            near &= row_dots(turned, end_normals) > FACING_COSINE
             if near.sum() < 4:
                 break
             members = np.flatnonzero(near)
@@ -311,7 +311,7 @@ def _rate(first: Scan, second: Scan, motion: Registration, unit: float, reach: f
         points = way.move(one.mesh.vertices[one.samples])
         normals = one.normals[one.samples] @ way.rotation.T
         distances, nearest = other.tree.query(points)
-        facing = np.einsum("si,si->s", normals, other.normals[nearest]) > FACING_COSINE
+        facing = row_dots(normals, other.normals[nearest]) > FACING_COSINE
         lying.append(((distances < reach * unit) & facing).mean())
         # What the other camera saw behind a point, it could not have seen through it.
         axes, tree, spacing = other.picture
@@ -333,12 +333,12 @@ def _refine(first: Scan, second: Scan, motion: Registration, unit: float) -> Reg
         moved, turned = motion.move(points), normals @ motion.rotation.T
         distances, nearest = second.tree.query(moved)
         planes = second.normals[nearest]
-        near = (distances < reach) & (np.einsum("si,si->s", turned, planes) > FACING_COSINE)
+        near = (distances < reach) & (row_dots(turned, planes) > FACING_COSINE)
         if near.sum() < FEWEST_POINTS:
             return motion
         # One step of Gauss and Newton: a small turn and a shift that close the gaps to the planes
         places, planes = moved[near], planes[near]
-        gaps = np.einsum("si,si->s", second.mesh.vertices[nearest[near]] - places, planes)
+        gaps = row_dots(second.mesh.vertices[nearest[near]] - places, planes)
         rows = np.hstack([np.cross(places, planes), planes])
         system = rows.T @ rows + np.diag(weights * len(rows))
         change = np.linalg.solve(system, rows.T @ gaps)
