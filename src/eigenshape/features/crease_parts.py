@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float, Int
 
 from certeig.kit.arrays import record
 from eigenshape._arrays import label_components
-from eigenshape._vectors import area_vectors, scale_to_unit, unit_vectors
+from eigenshape._vectors import area_vectors, row_dots, scale_to_unit, unit_vectors
 from eigenshape.features.contrast import FINE_CONTRAST
 from eigenshape.features.part_merging import tree_of_merges
 from eigenshape.features.region_tree import PartTree
@@ -141,7 +141,7 @@ def _cuts_at_ledges(mesh: TriangleMesh, measures: _Measures) -> Iterator[_Cut]:
     normals = np.column_stack([np.bincount(patches, column, n_patches) for column in vectors.T])
     patch_areas = np.bincount(patches, areas, n_patches)
     one, two = points[mesh.faces].mean(axis=1)[pairs].transpose(1, 0, 2)
-    concave = ~smooth & (np.einsum("pi,pi->p", vectors[pairs[:, 0]], two - one) > 0)
+    concave = ~smooth & (row_dots(vectors[pairs[:, 0]], two - one) > 0)
     ends = np.concatenate([pairs[concave], pairs[concave, ::-1]])
     creases = np.tile(edges[concave], 2)
     creased = np.bincount(patches[ends[:, 0]], lengths[creases], n_patches)

@@ -7,7 +7,7 @@ from scipy.spatial import KDTree
 from scipy.spatial.distance import cdist
 
 from certeig.kit.arrays import record
-from eigenshape._vectors import scale_to_unit, unit_vectors
+from eigenshape._vectors import row_dots, scale_to_unit, unit_vectors
 from eigenshape.features.contrast import FINE_CONTRAST, PART_CONTRAST
 from eigenshape.features.part_merging import (
     PART_TIME,
@@ -211,8 +211,8 @@ def inscribed_radii(
         inside = gaps < radii[live] * (1 - SHRINKAGE)
         live = live[inside]
         chords = points[nearest[inside]] - here[inside]
-        heights = np.einsum("mi,mi->m", chords, inward[inside])
-        squares = np.einsum("mi,mi->m", chords, chords)
+        heights = row_dots(chords, inward[inside])
+        squares = row_dots(chords, chords)
         facing = heights > LEAST_CHORD_COSINE * np.sqrt(squares)
         live = live[facing]
         if not len(live):
@@ -231,7 +231,7 @@ def lines_of_sight(
     """
     distances = cdist(points, points)
     # Entry (i, j): how far point j lies behind the tangent plane of point i.
-    behind = np.einsum("mi,mi->m", points, normals)[:, None] - normals @ points.T
+    behind = row_dots(points, normals)[:, None] - normals @ points.T
     inside = behind > LEAST_SINE * distances
     np.fill_diagonal(inside, False)  # both sides are 0 there, up to rounding
     lines = np.exp(-np.square(distances / SIGHT_REACH))
@@ -264,9 +264,9 @@ def _measure_borders(
     middle = (first + second) / 2
     _, before = tree.query(middle - TURN_REACH * side * across)
     _, after = tree.query(middle + TURN_REACH * side * across)
-    cosines = np.einsum("pi,pi->p", normals[before], normals[after])
+    cosines = row_dots(normals[before], normals[after])
     turns = np.minimum(np.arccos(np.clip(cosines, -1, 1)), 1)
-    spread = np.einsum("pi,pi->p", normals[after] - normals[before], across)
+    spread = row_dots(normals[after] - normals[before], across)
     turns *= -np.sign(spread)
 
     count = int(labels.max()) + 1

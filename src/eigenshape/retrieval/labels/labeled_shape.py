@@ -9,6 +9,7 @@ from certeig.kit.arrays import ReadOnly, freeze, record
 from eigenshape._arrays import face_labels
 from eigenshape._corners import mean_normals
 from eigenshape._errors import InvalidShapeError, try_auto
+from eigenshape._vectors import row_dots
 from eigenshape.geometry.conversion import as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.normalize import normalize_mesh
@@ -84,7 +85,7 @@ def label_points(mesh: TriangleMesh) -> LabelPoints:
     radii = np.full((len(found.vertices), 2), LARGEST_RADIUS)
     for row, vertex in enumerate(found.vertices):
         chords = unit.vertices[vertex] - unit.vertices
-        squares = np.einsum("ni,ni->n", chords, chords)
+        squares = row_dots(chords, chords)
         heights = chords @ normals[vertex]
         far = squares > SHORTEST_CHORD**2
         for column, side in enumerate((heights, -heights)):
