@@ -89,7 +89,8 @@ def settle_map(plan: FitPlan, places: Int[np.ndarray, " n"]) -> Turn:
     if is_rigid(plan, turn) or not is_rigid(plan, turn, PERHAPS_RIGID):
         return turn
     samples = turn.move(plan.part.mesh.vertices[plan.samples])
-    return settle(plan, samples, plan.samples, N_EXACT_STEPS, exact=True)
+    exact = settle(plan, samples, plan.samples, N_EXACT_STEPS, exact=True)
+    return exact if is_rigid(plan, exact) else turn
 
 
 def is_rigid(plan: FitPlan, turn: Turn, most: float = RIGID) -> bool:
