@@ -142,7 +142,10 @@ def test_parts_do_not_depend_on_the_scale_of_the_object(animal, scale):
     animal.scale = scale
     animal.rotation_euler = (np.pi / 2, 0, 0)  # y up
     bpy.ops.eigenshape.find_parts()
-    assert groups(animal) == before
+    # Two legs are twins, whose numbers rounding decides.
+    found = groups(animal)
+    assert found.keys() == before.keys()
+    assert sorted(map(sorted, found.values())) == sorted(map(sorted, before.values()))
 
 
 def test_eigenfunctions_of_polygons_are_those_of_their_triangles(add):
