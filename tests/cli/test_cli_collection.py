@@ -118,6 +118,14 @@ def test_the_page_holds_all_that_it_shows(output):
     assert np.linalg.norm(there - table["hand 2"].points, axis=1).max() < 0.1
 
 
+def test_landmarks_that_all_specimens_were_given_have_no_spread(output, tmp_path):
+    built = es.collections.open_collection(output)
+    given = {name: landmarks(number) for number, name in enumerate(built.names)}
+    carried = es.collections.carry_landmarks(built, given)
+    steps.write_collection_report(built, carried, tmp_path / "report.html", "all", lambda *_: None)
+    assert [mark["spread"] for mark in page_data(tmp_path)[1]["landmarks"]] == [0.0] * 4
+
+
 def test_the_same_command_goes_on_and_says_the_same(scans, output):
     before = (output / "landmarks.csv").read_bytes()
     facts = run_json("collection", scans, "-o", output, "--workers", 1, code=3)

@@ -106,8 +106,7 @@ def _landmarks(
         spreads.append(spread * (mean_radius(mean.vertices) / mean_radius(own)))
     on_mean = closest_points(mean, np.median(places, axis=0))
     # Given landmarks have no spread of their own.
-    widths = np.array(spreads)
-    typical = np.nan_to_num(np.nanmedian(np.where(widths > 0, widths, np.nan), axis=0))
+    typical = np.ma.median(np.ma.masked_equal(spreads, 0), axis=0).filled(0)
     specimens = np.array(carried.specimens)
     return [
         {
