@@ -238,7 +238,7 @@ def test_errors_are_one_line_and_exit_code_1(sphere, arguments, message):
             ),
             "A region is one of these",
         ),
-        (("index", "add", "{folder}/db", "{folder}"), "There must be meshes"),
+        (("index", "add", "{folder}/db", "{folder}"), "Folders of shapes must hold meshes"),
         (("demo", "--kind", "unicorn"), "--kind takes ant"),
     ],
 )

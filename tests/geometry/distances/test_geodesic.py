@@ -188,7 +188,9 @@ def test_farthest_points_are_chosen_one_after_the_other_with_all_distances():
     mesh = grid(14, 9)
     chosen, rows, nearest = farthest_points(mesh, 9)
     np.testing.assert_array_equal(rows, geodesic_distances(mesh, chosen))
-    np.testing.assert_array_equal(nearest, rows.argmin(axis=0))
+    # Of several that are equally near, however sums are rounded, the first
+    equal = rows <= (1 + 1e-9) * rows.min(axis=0)
+    np.testing.assert_array_equal(nearest, equal.argmax(axis=0))
     for number in range(1, 9):
         assert chosen[number] == rows[:number].min(axis=0).argmax()
     # Distances that end at a reach change no choice.
