@@ -4,17 +4,20 @@
     python benchmarks/bench_tetrahedra.py --quick     750 tetrahedra, seconds
 
 Each solve runs in a process of its own, on one core with one thread, after a small one that loads
-what it needs, and includes the matrices. ARPACK solves the same matrices with the
-factors of SciPy (SuperLU); of cubic elements these take more memory than most machines have.
+what it needs, and includes the matrices. ARPACK solves our matrices with the factors of SciPy (SuperLU), which
+take more memory for cubic elements than most machines have, and with those of CHOLMOD (cholespy). So it does
+the matrices of scikit-fem, which has no cubic elements.
 """
 
 import statistics
 import time
 
 import numpy as np
+import scipy.sparse as sp
 from machine import memory_now, peak_memory
 from report import Report, Row, in_process, options_of, ratio_text
 from scipy.sparse.linalg import eigsh
+from spectrum_libraries import arpack_with, cholmod_factor
 
 import eigenshape as es
 
@@ -31,14 +34,34 @@ def eigenvalues(library: str, mesh: es.SimplicialMesh, order: int) -> np.ndarray
 
         tetrahedra = lapy.TetMesh(np.array(mesh.points), np.array(mesh.simplices))
         return lapy.Solver(tetrahedra).eigs(PAIRS)[0]
-    laplacian = es.operators.fem_laplacian(mesh, order)
-    if library == "ARPACK":
+    if library == "eigenshape":
+        return certified_eigenvalues(mesh, order)
+    if library.startswith("scikit-fem"):
+        stiffness, mass = scikit_fem_matrices(mesh, order)
+    else:
+        laplacian = es.operators.fem_laplacian(mesh, order)
         stiffness, mass = laplacian.stiffness.tocsc(), laplacian.mass.tocsc()
-        return np.sort(eigsh(stiffness, PAIRS, mass, sigma=-0.01, return_eigenvectors=False))
-    found = es.solve_spectrum(laplacian, PAIRS)
+    if library.endswith("CHOLMOD"):
+        return np.sort(arpack_with(cholmod_factor, stiffness, mass, PAIRS)[0])
+    return np.sort(eigsh(stiffness, PAIRS, mass, sigma=-0.01, return_eigenvectors=False))
+
+
+def certified_eigenvalues(mesh: es.SimplicialMesh, order: int) -> np.ndarray:
+    """Return the lowest eigenvalues by eigenshape."""
+    found = es.solve_spectrum(es.operators.fem_laplacian(mesh, order), PAIRS)
     if not found.certificate.complete:
         raise RuntimeError(f"order {order}: the spectrum is not certified")
     return found.eigenvalues
+
+
+def scikit_fem_matrices(mesh: es.SimplicialMesh, order: int) -> tuple[sp.csc_array, sp.csc_array]:
+    """Return W and B of scikit-fem, as its own documentation writes them."""
+    import skfem  # noqa: PLC0415 - a process loads only the library that it measures
+    from skfem.models.poisson import laplace, mass  # noqa: PLC0415
+
+    element = {1: skfem.ElementTetP1, 2: skfem.ElementTetP2}[order]()
+    basis = skfem.Basis(skfem.MeshTet(mesh.points.T, mesh.simplices.T), element)
+    return sp.csc_array(laplace.assemble(basis)), sp.csc_array(mass.assemble(basis))
 
 
 def solve(library: str, order: int, n_cells: int) -> Row:
@@ -56,7 +79,11 @@ def solve(library: str, order: int, n_cells: int) -> Row:
 
 def measured(order: int, repeats: int, n_cells: int) -> list[Row]:
     """Return a row for each library on elements of one order; libraries take turns."""
-    libraries = ["eigenshape", *["ARPACK"] * (order < CUBIC), *["LaPy"] * (order == LINEAR)]
+    libraries = ["eigenshape", "ARPACK, CHOLMOD"]
+    if order < CUBIC:
+        libraries += ["ARPACK", "scikit-fem, ARPACK", "scikit-fem, CHOLMOD"]
+    if order == LINEAR:
+        libraries += ["LaPy"]
     runs: dict[str, list[Row]] = {library: [] for library in libraries}
     for _ in range(repeats):
         for library, done in runs.items():
@@ -78,7 +105,9 @@ def cells(row: Row) -> list[str]:
 def main() -> None:
     """Measure, print, and write what was asked for."""
     options = options_of(__doc__).parse_args()
-    report = Report(["eigenshape", "numpy", "scipy", "lapy"], options, COLUMNS, cells)
+    report = Report(
+        ["eigenshape", "numpy", "scipy", "lapy", "scikit-fem", "cholespy"], options, COLUMNS, cells
+    )
     for order in range(LINEAR, CUBIC + 1):
         for row in measured(order, options.repeats, 5 if options.quick else 18):
             report.add(row)

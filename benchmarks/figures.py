@@ -74,7 +74,8 @@ STORE = ("retrieval/store", "retrieval/search")
 # The most important first, so that what there is time for is measured: some forty minutes on two idle cores.
 FIGURES = {
     "spectrum": Figure(
-        "bench_spectrum.py --cases sphere-40k,sphere-160k,octopus,airplane,dragon --libraries lapy --repeats 1",
+        "bench_spectrum.py --cases sphere-40k,sphere-160k,octopus,airplane,dragon "
+        "--libraries lapy,cholespy,pardiso --repeats 1",
         SOLVER,
     ),
     "libraries": Figure("bench_spectrum.py --cases sphere-10k,graph-sphere --repeats 1", SOLVER),

@@ -71,53 +71,58 @@ def _arpack(laplacian: es.Laplacian, k: int) -> tuple[np.ndarray, np.ndarray]:
     return spl.eigsh(laplacian.stiffness.tocsc(), k, laplacian.mass.tocsc(), sigma=-0.01)
 
 
-def _with_factor(
-    laplacian: es.Laplacian, k: int, factor: Callable[[sp.csc_array], Callable[..., np.ndarray]]
+def arpack_with(
+    factor: Callable[[sp.csc_array], Callable[..., np.ndarray]],
+    stiffness: sp.csc_array,
+    mass: sp.csc_array,
+    k: int,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Call ARPACK as `_arpack` does, with solves of W + 0.01 B by another library."""
-    stiffness, mass = laplacian.stiffness.tocsc(), laplacian.mass.tocsc()
+    """Call ARPACK with solves of W + 0.01 B by another library."""
     shifted = sp.csc_array(stiffness + 0.01 * mass)
     shifted.sort_indices()
     inverse = spl.LinearOperator(shifted.shape, matvec=factor(shifted), dtype=np.float64)
     return spl.eigsh(stiffness, k, mass, sigma=-0.01, OPinv=inverse)
 
 
-def _cholespy_solve(laplacian: es.Laplacian, k: int) -> tuple[np.ndarray, np.ndarray]:
+def cholmod_factor(matrix: sp.csc_array) -> Callable[..., np.ndarray]:
+    """Factor a matrix by CHOLMOD, as cholespy calls it, and return what solves with it."""
     from cholespy import CholeskySolverD, MatrixType
 
-    def factor(matrix: sp.csc_array) -> Callable[..., np.ndarray]:
-        places = matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32)
-        solver = CholeskySolverD(matrix.shape[0], *places, matrix.data, MatrixType.CSC)
-        found = np.empty(matrix.shape[0])
+    places = matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32)
+    solver = CholeskySolverD(matrix.shape[0], *places, matrix.data, MatrixType.CSC)
+    found = np.empty(matrix.shape[0])
 
-        def solve(right: np.ndarray) -> np.ndarray:
-            solver.solve(np.ascontiguousarray(right, dtype=np.float64).ravel(), found)
-            return found.copy()
+    def solve(right: np.ndarray) -> np.ndarray:
+        solver.solve(np.ascontiguousarray(right, dtype=np.float64).ravel(), found)
+        return found.copy()
 
-        return solve
-
-    return _with_factor(laplacian, k, factor)
+    return solve
 
 
-def _pardiso_solve(laplacian: es.Laplacian, k: int) -> tuple[np.ndarray, np.ndarray]:
+def _pardiso_factor(matrix: sp.csc_array) -> Callable[..., np.ndarray]:
     from pypardiso import PyPardisoSolver
 
-    def factor(matrix: sp.csc_array) -> Callable[..., np.ndarray]:
-        upper, solver = sp.csr_matrix(sp.triu(matrix)), PyPardisoSolver(mtype=2)
-        upper.sort_indices()
-        solver.set_phase(12)
-        solver._call_pardiso(upper, np.zeros((matrix.shape[0], 1)))
-        solver.set_phase(33)
-        return lambda right: solver._call_pardiso(upper, right.reshape(-1, 1)).ravel()
-
-    return _with_factor(laplacian, k, factor)
+    upper, solver = sp.csr_matrix(sp.triu(matrix)), PyPardisoSolver(mtype=2)
+    upper.sort_indices()
+    solver.set_phase(12)
+    solver._call_pardiso(upper, np.zeros((matrix.shape[0], 1)))
+    solver.set_phase(33)
+    return lambda right: solver._call_pardiso(upper, right.reshape(-1, 1)).ravel()
 
 
-def _lapy(lump: bool) -> Callable[[Shape], Any]:
+def _arpack_by(
+    factor: Callable[[sp.csc_array], Callable[..., np.ndarray]],
+) -> Callable[[es.Laplacian, int], tuple[np.ndarray, np.ndarray]]:
+    return lambda laplacian, k: arpack_with(
+        factor, laplacian.stiffness.tocsc(), laplacian.mass.tocsc(), k
+    )
+
+
+def _lapy(**options: bool) -> Callable[[Shape], Any]:
     def build(shape: Shape) -> object:
         import lapy
 
-        return lapy.Solver(lapy.TriaMesh(shape["vertices"], shape["faces"]), lump=lump)
+        return lapy.Solver(lapy.TriaMesh(shape["vertices"], shape["faces"]), **options)
 
     return build
 
@@ -201,7 +206,7 @@ LIBRARIES = {
     ),
     "ARPACK, cholespy": Library(
         _our_mesh,
-        _cholespy_solve,
+        _arpack_by(cholmod_factor),
         _our_matrices,
         "mesh",
         "cholespy",
@@ -209,14 +214,14 @@ LIBRARIES = {
     ),
     "ARPACK, PARDISO": Library(
         _our_mesh,
-        _pardiso_solve,
+        _arpack_by(_pardiso_factor),
         _our_matrices,
         "mesh",
         "pypardiso",
         "eigsh(W, k, B, sigma=-0.01, OPinv=...), factors by the MKL",
     ),
     "LaPy": Library(
-        _lapy(lump=False),
+        _lapy(),
         _lapy_solve,
         _lapy_matrices,
         "mesh",
@@ -230,6 +235,14 @@ LIBRARIES = {
         "mesh",
         "lapy",
         "Solver(TriaMesh(v, f), lump=True).eigs(k)",
+    ),
+    "LaPy, CHOLMOD": Library(
+        _lapy(use_cholmod=True),
+        _lapy_solve,
+        _lapy_matrices,
+        "mesh",
+        "lapy[chol]",
+        "Solver(TriaMesh(v, f), use_cholmod=True).eigs(k)",
     ),
     "robust_laplacian": Library(
         _robust,
