@@ -23,8 +23,8 @@ shapes = {
 index = es.ShapeIndex.create(None)
 for name, mesh in shapes.items():
     index.add(name, mesh, n_views=0)
-for one, two, score in es.retrieval.find_duplicates(index):
-    print(f"{one} and {two}: score {score:.3f}")
+for one, two, score, kind in es.retrieval.find_duplicates(index):
+    print(f"{one} and {two}: {kind}, score {score:.3f}")
 
 # %%
 # All four, as their files have them.

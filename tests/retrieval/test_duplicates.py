@@ -16,8 +16,8 @@ def test_copies_are_found_and_kinds_are_apart():
         moved = es.TriangleMesh(3 * mesh.vertices[:, [1, 2, 0]] + 7, mesh.faces)
         index.add(f"a {kind}", moved, n_views=0)
     pairs = find_duplicates(index)
-    assert {(one, two) for one, two, _ in pairs} == {("a bird", "bird"), ("a fish", "fish")}
-    assert all(score < 0.05 for _, _, score in pairs)
+    assert {(one, two) for one, two, _, _ in pairs} == {("a bird", "bird"), ("a fish", "fish")}
+    assert all(score < 0.05 for _, _, score, _ in pairs)
     assert len(find_duplicates(index, most_score=9)) == 6
 
 

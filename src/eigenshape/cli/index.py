@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from pathlib import Path
-from typing import Annotated, Any, cast
+from typing import Annotated
 
 import typer
 
@@ -30,9 +30,6 @@ Sides = Annotated[int | None, typer.Option(min=0, max=50)]
 
 KILOBYTE = 1000  # bytes
 DAMAGED = 1  # exit code of `verify`
-# Score of copies at most: of 19 shapes, moved and scaled in single precision, it is up to 0.009, and of
-# poses of animals, 0.01 and more.
-COPY = 0.01
 MOST_NAMED = 5  # shapes that a message names
 
 
@@ -313,8 +310,7 @@ def duplicates(
     """
     opened = es.ShapeIndex.open(index)
     with progress_bar("duplicates") as progress:
-        found = es.retrieval.find_duplicates(opened, most_score=score, progress=progress)
-    pairs = [(*pair, _kind_of_pair(opened, *pair)) for pair in found]
+        pairs = es.retrieval.find_duplicates(opened, most_score=score, progress=progress)
     columns = ["shape", "other", "score", "kind"]
     if as_json:
         rows = [dict(zip(columns, pair, strict=True)) for pair in pairs]
@@ -324,17 +320,6 @@ def duplicates(
         print_table("Nearly the same", columns, texts)
     else:
         out.print(f"none of {count_shapes(len(opened))} is nearly the same as another")
-
-
-def _kind_of_pair(index: es.ShapeIndex, one: str, other: str, score: float) -> str:
-    """Return what two shapes that are nearly the same are to each other."""
-    if score >= COPY:
-        return "similar"
-    recipe = index.default_recipe()
-    if isinstance(recipe, es.retrieval.PatchRecipe):
-        first, second = (cast(Any, index.descriptors(name, recipe)[0]) for name in (one, other))
-        return "mirror image" if first.is_mirror_image(second) else "copy"
-    return "copy"
 
 
 def learn(
