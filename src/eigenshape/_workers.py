@@ -163,7 +163,10 @@ def run_in_workers(
     pool = start_pool(workers, max(min(workers.count, len(items)), 1))
 
     def submit(item: Item) -> "Future[Outcome[T]]":
-        return schedule_work(pool, work, item.path, workers)
+        try:
+            return schedule_work(pool, work, item.path, workers)
+        except RuntimeError as error:  # the pool has given up starting workers
+            raise CerteigError(NO_WORKERS) from error
 
     try:
         n_ahead = FILES_AHEAD * workers.count

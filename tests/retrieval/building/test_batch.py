@@ -10,6 +10,7 @@ import time
 import warnings
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -17,7 +18,8 @@ from describers import RECIPE, SPOIL_ROWS, mesh_of, read_and_count, read_by_cont
 from filelock import FileLock
 
 import eigenshape
-from certeig.kit.errors import InvalidParameterError
+from certeig.kit.errors import CerteigError, InvalidParameterError
+from eigenshape import _workers
 from eigenshape._workers import Item, Outcome, Workers, run_in_workers
 from eigenshape.retrieval.building.batch import (
     build_index,
@@ -201,6 +203,7 @@ def wait_until(happens):
 
 UNGUARDED = """
 from pathlib import Path
+from unittest.mock import Mock
 from describers import RECIPE, read_by_content
 import eigenshape as es
 
@@ -236,6 +239,15 @@ def test_a_script_without_a_main_guard_is_told_so(tmp_path):
     imports, _, body = UNGUARDED.partition("\n\n")
     guarded = f"{imports}\n\nif __name__ == '__main__':\n{textwrap.indent(body, '    ')}"
     assert "added=('a', 'b', 'c')" in run_script(tmp_path, guarded).stdout
+
+
+def test_a_pool_that_gives_up_before_it_takes_a_file_says_why(index, tmp_path, monkeypatch):
+    pool, given_up = Mock(), RuntimeError("Unexpected error within the Pool")
+    monkeypatch.setattr(_workers, "start_pool", lambda *_: pool)
+    monkeypatch.setattr(_workers, "schedule_work", Mock(side_effect=given_up))
+    with pytest.raises(CerteigError, match="under `if __name__"):
+        build(index, items(tmp_path, a="1"))
+    assert (pool.stop.call_count, pool.join.call_count) == (1, 1)
 
 
 def test_what_a_batch_cannot_begin_with(index, tmp_path):
