@@ -122,6 +122,7 @@ def test_prepared_factors_and_pieces_of_a_curve_give_the_same():
     np.testing.assert_allclose(pieces, whole, atol=1e-12)
 
 
+@pytest.mark.filterwarnings("ignore:Both sides of a seam")
 def test_components_without_a_curve_are_infinitely_far():
     square, loop, _ = square_loop(12)
     pair = disjoint_union(square, square)

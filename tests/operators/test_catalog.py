@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
+import eigenshape as es
 from certeig.kit.errors import InvalidParameterError
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.cloud import PointCloud
@@ -90,3 +91,20 @@ def test_uneven_points_off_a_surface_are_refused():
     line = np.concatenate([np.linspace(0, 1, 50), [60.0, 61.0]])[:, None]
     with pytest.raises(InvalidShapeError, match="Choose a larger t"):
         build_laplacian(PointCloud(line, dim=1))
+
+
+def tube():
+    """A grid that is rolled up and left open, as files with textures are."""
+    sheet = es.shapes.grid(12, 8)
+    angles = 2 * np.pi * sheet.vertices[:, 0] / sheet.vertices[:, 0].max()
+    rolled = np.column_stack([np.cos(angles), np.sin(angles), sheet.vertices[:, 1]])
+    return es.TriangleMesh(rolled, sheet.faces)
+
+
+@pytest.mark.parametrize("name", ["cotangent", "robust", "p2", "p3"])
+def test_an_open_seam_is_said_where_the_operator_is_built(name):
+    with pytest.warns(UserWarning, match=r"a seam must share their vertices.*\(8 such\)"):
+        opened = es.build_laplacian(tube(), name)
+    closed = es.build_laplacian(es.repair(tube(), ["weld_seams"]).mesh, name)
+    first = es.solve_spectrum(closed, 4).eigenvalues[1]
+    assert es.solve_spectrum(opened, 4).eigenvalues[1] != pytest.approx(first, rel=0.05)

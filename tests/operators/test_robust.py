@@ -90,6 +90,7 @@ def test_laws_where_faces_meet_in_any_way(mesh):
     np.testing.assert_allclose(robust_laplacian(mesh).mass.sum(), surface_area(mesh), rtol=1e-12)
 
 
+@pytest.mark.filterwarnings("ignore:Both sides of a seam")
 @few
 @given(seeds)
 def test_laws_in_a_soup(seed):
@@ -351,6 +352,7 @@ def test_the_spectrum_of_the_moebius_strip_is_near_that_of_the_flat_one():
     np.testing.assert_allclose(found, [0, 1, 1, 4, 4], rtol=0.1, atol=1e-12)
 
 
+@pytest.mark.filterwarnings("ignore:Both sides of a seam")
 @pytest.mark.data
 def test_every_nasty_file_that_can_be_read_gives_a_lawful_operator_or_a_named_error(data):
     refused, lawful = [], 0

@@ -98,7 +98,6 @@ def spectrum(
             "instead of --below, or leave out --accuracy."
         )
     found: Any = steps.load_shape(shape, repair, dim, cells)
-    steps.note_seams(found)
     is_cloud = isinstance(found, es.PointCloud)
     if eigenfunctions and not isinstance(found, es.TriangleMesh):
         raise InvalidParameterError(

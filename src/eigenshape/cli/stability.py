@@ -78,7 +78,6 @@ def stability(
     shapes: list[Any] = []
     for path in (one, two):
         shape: Any = steps.load_shape(path, repair, dim)
-        steps.note_seams(shape, path.name)
         if normalize != "none":
             if not isinstance(shape, es.TriangleMesh):
                 raise InvalidParameterError(

@@ -93,15 +93,16 @@ def require_joined(mesh: Mesh) -> None:
         )
 
 
-def warn_of_seams(mesh: TriangleMesh) -> None:
-    """Warn if vertices are double along seams, as those of a texture: the mesh comes apart there."""
+def warn_of_seams(mesh: Mesh) -> None:
+    """Warn if points are double along seams, as those of a texture: the shape is open there."""
     pairs = seams(mesh)
     if len(pairs):
         one, two = pairs[0]
         warnings.warn(
-            "Both sides of a seam must share their vertices to bend together; the edges "
-            f"{one.tolist()} and {two.tolist()} lie on each other and do not ({len(pairs)} such). "
-            'Try repair(mesh, ["weld_seams"]), or --repair weld_seams on the command line.',
+            "Both sides of a seam must share their vertices, or the shape is open there as if it were "
+            f"cut; the sides {one.tolist()} and {two.tolist()} lie on each other and do not "
+            f'({len(pairs)} such). Try repair(mesh, ["weld_seams"]), or --repair weld_seams on the '
+            "command line, unless a cut is meant.",
             stacklevel=3,
         )
 
@@ -110,11 +111,12 @@ def require_describable(mesh: Mesh) -> None:
     """Raise an error if a descriptor of the mesh would not describe the shape.
 
     A point without simplex, two simplices with the same corners and pieces that lie edge on edge
-    without sharing vertices are refused.
+    without sharing vertices are refused; a warning names seams within a piece.
     """
     require_simplices_everywhere(mesh)
     require_different_simplices(mesh)
     require_joined(mesh)
+    warn_of_seams(mesh)
 
 
 def require_oriented(mesh: TriangleMesh) -> None:

@@ -57,12 +57,14 @@ def _round_places(mesh: Mesh, used: Int[np.ndarray, " k"]) -> Int[np.ndarray, " 
     points, scale = size_one(mesh.points)
     tolerance = _stored_precision(mesh.points[np.unique(mesh.simplices)]) / scale
     spots = points[used[np.unique(place, return_index=True)[1]]]
-    lengths = side_lengths(points[mesh.simplices])
-    shortest = lengths.min(initial=np.inf, where=lengths > 0)
-    tolerance = np.minimum(tolerance, shortest / SIDES_PER_GAP)
     near = scipy.spatial.cKDTree(spots).query_pairs(
         tolerance.max(), p=np.inf, output_type="ndarray"
     )
+    if not len(near):
+        return place
+    lengths = side_lengths(points[mesh.simplices])
+    shortest = lengths.min(initial=np.inf, where=lengths > 0)
+    tolerance = np.minimum(tolerance, shortest / SIDES_PER_GAP)
     within = (np.abs(spots[near[:, 0]] - spots[near[:, 1]]) <= tolerance).all(axis=1)
     _, joined = label_components(len(spots), *near[within].T)
     return joined[place]

@@ -26,7 +26,7 @@ from eigenshape.matching.registration import (
     fit_motion,
     register_described,
 )
-from eigenshape.operators.cotangent import cotangent_laplacian
+from eigenshape.operators.cotangent import surface_laplacian
 from eigenshape.scans.reconstruction import reconstruct_surface
 
 # Least score of two scans that are joined. Of 50 pairs of frames of shapes that are not round, of the
@@ -206,7 +206,7 @@ def _bend_onto(
     start = np.where(fixed[:, None], images, motion.move(mesh.vertices))
     turn = np.roll(Rotation.from_matrix(motion.rotation).as_quat(), 1)
     turns = np.tile(turn, (mesh.n_vertices, 1))
-    edges = edge_weights(mesh, cotangent_laplacian(mesh).stiffness)
+    edges = edge_weights(mesh, surface_laplacian(mesh).stiffness)
     bent = relax(edges, free_part(edges, fixed), mesh.vertices, start, turns, N_ROUNDS)
     return TriangleMesh(bent, mesh.faces), numbers
 

@@ -8,7 +8,7 @@ from certeig.kit.threads import map_in_threads
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import dual_volumes
 from eigenshape.matching.match_loops import nearest_face_points
-from eigenshape.operators.cotangent import cotangent_laplacian
+from eigenshape.operators.cotangent import surface_laplacian
 from eigenshape.spectral.solve import solve_spectrum
 
 N_MODES = (100, 150)  # of the whole, round by round; 200 more improve the error by 0.01
@@ -34,7 +34,7 @@ class Modes(ReadOnly):
 def lowest_modes(mesh: TriangleMesh, count: int = N_MODES[-1]) -> Modes:
     """Return so many modes of a surface, or fewer if it has few vertices."""
     k = max(min(count, int(mesh.n_vertices * MODES_PER_VERTEX)), 2)
-    spectrum = solve_spectrum(cotangent_laplacian(mesh), k)
+    spectrum = solve_spectrum(surface_laplacian(mesh), k)
     return Modes(spectrum.eigenvalues, spectrum.eigenvectors, dual_volumes(mesh))
 
 

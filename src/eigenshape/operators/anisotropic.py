@@ -8,7 +8,7 @@ from certeig.kit.errors import InvalidParameterError
 from eigenshape._corners import scaled_corners, triangular_sides
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
 from eigenshape.geometry.measure import surface_area, vertex_normals
-from eigenshape.geometry.requirements import require_sound, require_volumes
+from eigenshape.geometry.requirements import require_sound, require_volumes, warn_of_seams
 from eigenshape.operators import elements
 from eigenshape.operators.choices import Mass
 from eigenshape.operators.cotangent import linear_laplacian
@@ -80,6 +80,7 @@ def anisotropic_laplacian(
             f"({bad.size} such)."
         )
     require_sound(mesh)
+    warn_of_seams(mesh)
     return linear_laplacian(mesh, elements.gradient_products(mesh, tensors), mass)
 
 

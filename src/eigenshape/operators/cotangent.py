@@ -13,7 +13,7 @@ from eigenshape._vectors import row_dots, scale_to_unit
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
 from eigenshape.geometry.measure import vertex_normals
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.requirements import require_sound
+from eigenshape.geometry.requirements import require_sound, warn_of_seams
 from eigenshape.geometry.simplices import dual_volumes
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.operators import elements
@@ -81,6 +81,7 @@ def cotangent_laplacian(
     mass = mass or ("averaged" if mesh.dim == TETRAHEDRA else "lumped")
     require_choice(mass, Mass, "mass")
     require_sound(mesh)
+    warn_of_seams(mesh)
     products = elements.gradient_products(mesh)
     if conductivity is not None:
         values = positive_values(conductivity, "conductivity")
@@ -92,6 +93,12 @@ def cotangent_laplacian(
         # Gradients are constant on a simplex, so the integral takes the mean.
         products = products * values[mesh.simplices].mean(axis=1)[:, None, None]
     return linear_laplacian(mesh, products, mass)
+
+
+def surface_laplacian(mesh: TriangleMesh) -> Laplacian:
+    """Return the cotangent Laplacian of a surface; of its seams a verb has warned already."""
+    require_sound(mesh)
+    return linear_laplacian(mesh, elements.gradient_products(mesh), "lumped")
 
 
 def linear_laplacian(

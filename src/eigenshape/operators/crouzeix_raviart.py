@@ -14,7 +14,7 @@ from eigenshape._corners import in_length, scaled_corners, side_lengths, triangu
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.facet_lists import FacetTable
 from eigenshape.geometry.facets import facet_table
-from eigenshape.geometry.requirements import require_sound
+from eigenshape.geometry.requirements import require_sound, warn_of_seams
 from eigenshape.geometry.simplices import simplex_volumes
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.operators import elements
@@ -59,6 +59,7 @@ def crouzeix_raviart_laplacian(mesh: MeshLike) -> Laplacian:
     """
     mesh = as_simplicial(mesh)
     require_sound(mesh)
+    warn_of_seams(mesh)
     table = facet_table(mesh)
     weights = elements.stiffness(
         table.simplex_facets, mesh.dim**2 * elements.gradient_products(mesh), 1

@@ -7,7 +7,7 @@ from certeig.kit.arrays import whole_number
 from certeig.kit.typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.facets import boundary_facets
-from eigenshape.geometry.requirements import require_sound
+from eigenshape.geometry.requirements import require_sound, warn_of_seams
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.geometry.topology import require_simplices_everywhere
 from eigenshape.operators import elements
@@ -57,6 +57,7 @@ def fem_laplacian(mesh: MeshLike, order: Integer = 2) -> Laplacian:
     mesh = as_simplicial(mesh)
     degree = whole_number(order, "order", 1, HIGHEST)
     require_sound(mesh)
+    warn_of_seams(mesh)
     _, nodes = elements.number_nodes(mesh.simplices, degree)
     products = elements.gradient_products(mesh)
     laplacian = Laplacian(

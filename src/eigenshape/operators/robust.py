@@ -10,7 +10,11 @@ from eigenshape._errors import InvalidShapeError
 from eigenshape._vectors import size_one
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import MeshLike, ShapeLike, as_mesh
-from eigenshape.geometry.requirements import require_different_simplices, require_volumes
+from eigenshape.geometry.requirements import (
+    require_different_simplices,
+    require_volumes,
+    warn_of_seams,
+)
 from eigenshape.geometry.simplices import degenerate_simplices, require_span
 from eigenshape.geometry.topology import require_simplices_everywhere
 from eigenshape.operators import flip_loops
@@ -101,6 +105,7 @@ def robust_laplacian(
                 f"{n_neighbors}. Pass PointCloud(mesh.points) for its points alone."
             )
         delaunay, scale = delaunay_cover(mesh, mollify)
+        warn_of_seams(mesh)
         copies = 1
     # The cover counts the surface twice: a half of each area, and a quarter of each sum of
     # cotangents instead of a half. What rounding leaves of such a sum below zero is zero.

@@ -18,7 +18,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import mean_side_length
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import boundary_vertices, neighbor_links
-from eigenshape.operators.cotangent import cotangent_laplacian
+from eigenshape.operators.cotangent import cotangent_laplacian, surface_laplacian
 from eigenshape.operators.laplacian import Laplacian
 
 # Noise level at which `denoise` lets heat flow one mean edge length: that of Gaussian noise of a
@@ -121,7 +121,7 @@ def denoise(mesh: MeshLike, *, reach: float | None = None) -> TriangleMesh:
         )
     points, scale = size_one(mesh.vertices)
     unit = TriangleMesh(points, mesh.faces)
-    laplacian, time = cotangent_laplacian(unit), (edges * mean_side_length(unit)) ** 2
+    laplacian, time = surface_laplacian(unit), (edges * mean_side_length(unit)) ** 2
     rim = boundary_vertices(mesh)
     found = points.copy()
     if len(rim):

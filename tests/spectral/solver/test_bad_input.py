@@ -313,6 +313,7 @@ def test_three_hundred_spheres_by_degree():
     assert spectrum.certificate.n_split == 1400
 
 
+@pytest.mark.filterwarnings("ignore:Both sides of a seam")
 def test_parts_of_many_sizes_and_full_masses():
     meshes = [
         icosphere(0),

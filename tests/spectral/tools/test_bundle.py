@@ -226,6 +226,7 @@ def test_bad_shapes_are_named():
         es.spectral.operator_bundle(es.PointCloud(np.eye(3), 1), 1)
 
 
+@pytest.mark.filterwarnings("ignore:Both sides of a seam")
 def test_where_normals_cancel_the_neighbors_give_the_tangent_plane():
     # Two equal triangles back to back: their normals cancel at every corner they share.
     folded = es.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 1, 0]], [[0, 1, 2], [1, 0, 3]])

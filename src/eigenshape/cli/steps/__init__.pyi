@@ -26,7 +26,6 @@ from .reading import load_poses as load_poses
 from .reading import load_repaired as load_repaired
 from .reading import load_shape as load_shape
 from .reading import load_surface as load_surface
-from .reading import note_seams as note_seams
 from .reading import read_examples as read_examples
 from .reading import read_map as read_map
 from .reading import repair_worn as repair_worn

@@ -11,13 +11,11 @@ from certeig.kit.errors import CerteigError, InvalidParameterError
 from eigenshape.cli.console import err, escape_text, print_repairs
 from eigenshape.cli.inputs import repair_names
 from eigenshape.deformation.distortion import require_poses
-from eigenshape.geometry.cloud import PointCloud, Shape
+from eigenshape.geometry.cloud import Shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair import repair
-from eigenshape.geometry.repairs.repair_names import drops_missing
 from eigenshape.geometry.repairs.repair_report import RepairedCloud, RepairedMesh
 from eigenshape.geometry.repairs.shape_facts import shape_facts
-from eigenshape.geometry.seams import seams
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.io import shape_files
 from eigenshape.io.attributes import MeshAttributes
@@ -62,22 +60,12 @@ def load_shape(
     return done.cloud if isinstance(done, RepairedCloud) else done.mesh
 
 
-def note_seams(shape: Shape, name: str = "this shape") -> None:
-    """Print on stderr that a mesh is open along seams."""
-    n_seams = 0 if isinstance(shape, PointCloud) else len(seams(shape))
-    if n_seams:
-        err.print(
-            f"[yellow]note:[/] {escape_text(name)} is open along seams ({n_seams} sides), which no heat "
-            "crosses; --repair weld_seams closes them"
-        )
-
-
 def load_repaired(
     path: Path, repairs: str, cells: CellKind | None, scene: str | int | None
 ) -> tuple[Shape, RepairedMesh[Mesh]]:
     """Read a shape, make a surface of points, and repair it; return it as it was read and as it is now."""
     names = repair_names(repairs)
-    at_once = ["drop_missing"] if drops_missing(names) else []
+    at_once = ["drop_missing"] if {"auto", "drop_missing"} & {*names} else []
     found: Any = shape_files.load_shape(path, at_once, cells=cells, scene=scene)
     cloud = found.cloud if isinstance(found, RepairedCloud) else None
     if cloud or found.mesh.dim == found.mesh.points.shape[1] == 2:

@@ -20,7 +20,7 @@ from eigenshape.geometry.normalize import normalize_mesh
 from eigenshape.geometry.repairs.repair_steps import fragment_vertices
 from eigenshape.geometry.requirements import require_describable
 from eigenshape.geometry.topology import boundary_edges, vertex_components
-from eigenshape.operators.cotangent import cotangent_laplacian
+from eigenshape.operators.cotangent import surface_laplacian
 from eigenshape.operators.laplacian import Laplacian, dirichlet_laplacian
 from eigenshape.retrieval.heat.recipe import SCALE_FREE, HeatRecipe
 from eigenshape.retrieval.heat.score import HeatDescriptor
@@ -209,7 +209,7 @@ def heat_features(
     require_describable(mesh)
     if recipe.unit == "box":
         mesh = normalize_mesh(mesh, "box")
-    laplacian = cotangent_laplacian(mesh)
+    laplacian = surface_laplacian(mesh)
     areas = laplacian.mass.diagonal()
     fragments = fragment_vertices(mesh)
     _, labels = vertex_components(mesh)

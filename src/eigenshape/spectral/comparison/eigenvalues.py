@@ -9,7 +9,7 @@ from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike, Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.requirements import require_describable
-from eigenshape.operators.cotangent import cotangent_laplacian
+from eigenshape.operators.cotangent import surface_laplacian
 from eigenshape.spectral.bounds.brackets import Brackets
 from eigenshape.spectral.requirements import require_lowest
 from eigenshape.spectral.solve import solve_spectrum
@@ -304,6 +304,6 @@ def shape_dna(mesh: MeshLike, n_values: Integer | None = None) -> Float[np.ndarr
     most = mesh.n_vertices - 1
     count = min(N_VALUES, most) if n_values is None else whole_number(n_values, "n_values", 1, most)
     require_describable(mesh)
-    laplacian = cotangent_laplacian(mesh)
+    laplacian = surface_laplacian(mesh)
     values = solve_spectrum(laplacian, count + 1).eigenvalues[1:]
     return values * float(laplacian.mass.sum()) / np.arange(1, count + 1)
