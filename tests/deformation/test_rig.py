@@ -118,7 +118,7 @@ def test_seams_are_named():
     behind = whole.vertices[whole.faces].mean(axis=1)[:, 0] < 0.1
     front, back = submesh(whole, ~behind)[0], submesh(whole, behind)[0]
     cut = disjoint_union(front, back)
-    message = r"edges \[\d+, \d+\] and \[\d+, \d+\] lie on each other and do not \(\d+ such\)"
+    message = r"sides \[\d+, \d+\] and \[\d+, \d+\] lie on each other and do not \(\d+ such\)"
     with pytest.warns(UserWarning, match=message):
         rig_shape(cut)
     joined = repair(cut, ["weld_seams"]).mesh

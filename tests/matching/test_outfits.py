@@ -124,6 +124,7 @@ def identity_match(mesh, confidence=None):
     )
 
 
+@pytest.mark.filterwarnings("ignore:Both sides of a seam")
 def test_joints_and_blend_shapes_turn_and_grow_with_the_shape(worn, moved, hero, tmp_path):
     turn, target, match = moved
     outfit = es.matching.transfer(worn, target, match=match)
@@ -141,6 +142,7 @@ def test_joints_and_blend_shapes_turn_and_grow_with_the_shape(worn, moved, hero,
     np.testing.assert_allclose(after["weights"], before["weights"][nearest], atol=1e-6)
 
 
+@pytest.mark.filterwarnings("ignore:Both sides of a seam")
 def test_the_target_is_the_rest_pose(worn, moved, tmp_path):
     _, target, match = moved
     outfit = es.matching.transfer(worn, target, match=match)
@@ -150,6 +152,7 @@ def test_the_target_is_the_rest_pose(worn, moved, tmp_path):
     assert cKDTree(target.vertices).query(vertices)[0].max() < 1e-5
 
 
+@pytest.mark.filterwarnings("ignore:Both sides of a seam")
 def test_animations_move_joints_about_their_new_places(worn, moved, tmp_path):
     _, target, match = moved
     outfit = es.matching.transfer(worn, target, match=match)

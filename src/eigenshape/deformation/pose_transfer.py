@@ -16,7 +16,7 @@ from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import warn_of_seams
 from eigenshape.geometry.simplices import dual_volumes
-from eigenshape.operators.cotangent import cotangent_laplacian
+from eigenshape.operators.cotangent import surface_laplacian
 from eigenshape.spectral.maps.functional_map import FunctionalMap, transfer_function
 from eigenshape.spectral.maps.point_maps import map_from_points
 from eigenshape.spectral.solve import solve_spectrum
@@ -113,7 +113,7 @@ def transfer_deformation(
             )
         n_shared = min(POSE_MODES, before.n_vertices // 2, target.n_vertices // 2)
         source, other = (
-            solve_spectrum(cotangent_laplacian(mesh), n_shared) for mesh in (before, target)
+            solve_spectrum(surface_laplacian(mesh), n_shared) for mesh in (before, target)
         )
         mapping = map_from_points(source, other, partners, n_modes=n_shared)
     for mesh, spectrum, name in (
@@ -128,7 +128,7 @@ def transfer_deformation(
     wanted = mapping.matrix.shape[1] if n_modes is None else n_modes
     k = whole_number(wanted, "n_modes", 1, mapping.matrix.shape[1])
     few = FunctionalMap(mapping.matrix[:, :k], mapping.source, mapping.target)
-    weights = edge_weights(before, cotangent_laplacian(before).stiffness)
+    weights = edge_weights(before, surface_laplacian(before).stiffness)
     turns = fit_turns(weights, before.vertices, after.vertices)
     # A mean of rotations is no rotation: take the nearest one.
     carried = nearest_rotations(transfer_function(few, turns.reshape(-1, 9)).reshape(-1, 3, 3))
@@ -154,7 +154,7 @@ def _center(
 
 def _turn_edges(target: TriangleMesh, turns: Turns) -> Float[np.ndarray, "n 3"]:
     """Return the vertices of the target with its edges turned, and its center unchanged."""
-    edges = edge_weights(target, cotangent_laplacian(target).stiffness)
+    edges = edge_weights(target, surface_laplacian(target).stiffness)
     areas = dual_volumes(target)
     # The equations know edges alone: vertex 0 is fixed, and the center is restored below.
     fixed = np.arange(target.n_vertices) == 0

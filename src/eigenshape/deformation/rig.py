@@ -19,7 +19,7 @@ from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import warn_of_seams
 from eigenshape.geometry.topology import vertex_components
-from eigenshape.operators.cotangent import cotangent_laplacian
+from eigenshape.operators.cotangent import surface_laplacian
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 
@@ -131,7 +131,7 @@ def rig_shape(
     mesh = as_mesh(mesh)
     require_type(spectrum, Spectrum | None, "spectrum")
     warn_of_seams(mesh)
-    laplacian = cotangent_laplacian(mesh)
+    laplacian = surface_laplacian(mesh)
     if spectrum is None:
         n_components, _ = vertex_components(mesh)
         wanted = min(N_MODES + n_components - 1, mesh.n_vertices)

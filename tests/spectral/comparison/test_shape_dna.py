@@ -56,6 +56,6 @@ def test_bad_input_is_named():
     mesh = es.icosphere(0)
     with pytest.raises(InvalidParameterError, match=r"n_values must lie in 1\.\.11; it is 12"):
         es.spectral.shape_dna(mesh, n_values=12)
-    flat = es.TriangleMesh(np.zeros((4, 3)), [[0, 1, 2], [1, 2, 3]])
+    flat = es.TriangleMesh(np.outer(range(4), [1.0, 0, 0]), [[0, 1, 2], [1, 2, 3]])
     with pytest.raises(InvalidShapeError):
         es.spectral.shape_dna(flat, n_values=1)
