@@ -16,7 +16,7 @@ from report import Report, Row, in_process, options_of
 
 import eigenshape as es
 
-PACKAGES = ["eigenshape", "numpy", "scipy"]
+PACKAGES = ["eigenshape", "pyfmaps", "numpy", "scipy"]
 COLUMNS = ("shape", "call", "CPU s", "wall s")
 Call = tuple[str, Callable[[], object]]
 BUILDS: dict[str, Callable[[es.TriangleMesh], es.Laplacian]] = {
@@ -86,15 +86,32 @@ def compression(*, small: bool) -> Iterator[Call]:
 
 
 def matching(*, small: bool) -> Iterator[Call]:
-    """Yield a whole, and a part of it in another pose, seen from one side."""
+    """Yield what is done with a whole, and with a part of it in another pose, seen from one side."""
     n = 1_500 if small else 5_000
     whole = es.make_creature("quadruped", 1, n_vertices=n)
+    yield "100 certified pairs", lambda: es.solve_spectrum(es.cotangent_laplacian(whole), 100)
+    yield "describe", lambda: es.describe(whole)
+    yield "find_parts", lambda: es.find_parts(whole)
     part = es.partial_scan(es.make_creature("quadruped", 2, n_vertices=n), [0.9, 0.25, 0.45]).mesh
     target = es.matching.prepare_target(whole)
     yield "prepare_target", lambda: es.matching.prepare_target(whole)
     yield "match_shapes, a scan", lambda: es.match_shapes(part, target)
     pose = es.make_creature("quadruped", 3, n_vertices=n)
     yield "match_shapes, a whole", lambda: es.match_shapes(pose, target)
+    yield "pyFM, the same two wholes", lambda: map_by_pyfm(pose, whole)
+
+
+def map_by_pyfm(one: es.TriangleMesh, other: es.TriangleMesh) -> np.ndarray:
+    """Return the map of pyFM as its documentation makes it, spectra included."""
+    from pyFM.functional import FunctionalMapping  # noqa: PLC0415 - only this group needs it
+    from pyFM.mesh import TriMesh  # noqa: PLC0415
+
+    meshes = (TriMesh(np.array(mesh.vertices), np.array(mesh.faces)) for mesh in (one, other))
+    model = FunctionalMapping(*meshes)
+    model.preprocess()
+    model.fit()
+    model.zoomout_refine()
+    return np.asarray(model.get_p2p())
 
 
 GROUPS: dict[str, tuple[str, Callable[..., Iterator[Call]]]] = {
