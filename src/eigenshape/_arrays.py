@@ -7,7 +7,14 @@ import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
 from numpy.typing import NDArray
 
-from certeig.kit.arrays import all_finite, as_array, real_numbers, whole_number, whole_numbers
+from certeig.kit.arrays import (
+    all_finite,
+    as_array,
+    real_numbers,
+    require_no_mask,
+    whole_number,
+    whole_numbers,
+)
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike, Integer
 from eigenshape._component_loops import number_groups
@@ -36,9 +43,10 @@ def finite_rows(value: ArrayLike, name: str, columns: int | None = None) -> NDAr
         rows = rows.astype(np.float64, order="C")  # as kernels take them
     bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
     if bad.size:
+        remedy = " read_mesh(path, drop_missing=True) leaves out those of a file."
         raise InvalidShapeError(
             f"{name} must be finite; {SINGULAR.get(name, 'row')} {bad[0]} is {rows[bad[0]].tolist()} "
-            f"({bad.size} such)."
+            f"({bad.size} such).{remedy if name == 'vertices' else ''}"
         )
     return rows
 
@@ -239,12 +247,17 @@ def source_sets(sources: ArrayLike, n_points: int) -> list[Int[np.ndarray, " s"]
         entries: list[Any] = list(sources)  # type: ignore[arg-type]
     except (TypeError, KeyError):  # one number, or an object that is read by names
         entries = [sources]
-    return [source_points(entry, n_points) for entry in entries]
+    sets = [source_points(entry, n_points) for entry in entries]
+    if len(sets) == n_points:
+        require_no_mask(np.concatenate(sets), "The list of sources", n_points)
+    return sets
 
 
 def source_points(source: ArrayLike, n_points: int) -> Int[np.ndarray, " s"]:
     """Return the points of one source, ascending and each once. Raises an error if one is not a point."""
-    return np.unique(whole_numbers(source, "A source", 0, n_points - 1))
+    numbers = whole_numbers(source, "A source", 0, n_points - 1)
+    require_no_mask(numbers, "A source", n_points)
+    return np.unique(numbers)
 
 
 def require_sources(sources: ArrayLike, n_points: int) -> Int[np.ndarray, " k"]:
@@ -255,4 +268,5 @@ def require_sources(sources: ArrayLike, n_points: int) -> Int[np.ndarray, " k"]:
     wanted = whole_numbers(sources, "A source", 0, n_points - 1)
     if not wanted.size:
         raise InvalidParameterError(NO_SOURCE)
+    require_no_mask(wanted, "The list of sources", n_points)
     return wanted

@@ -16,6 +16,7 @@ from certeig.kit.arrays import (
     positive_number,
     real_numbers,
     record,
+    require_no_mask,
     whole_numbers,
 )
 from certeig.kit.errors import InvalidParameterError
@@ -183,8 +184,10 @@ def region_mask(mesh: MeshLike, region: Region) -> Bool[np.ndarray, " n"]:
                 f"the shape is {chosen.shape}."
             )
         return chosen
+    numbers = whole_numbers(chosen, "A vertex of a region", 0, mesh.n_vertices - 1)
+    require_no_mask(numbers, "A region", mesh.n_vertices)
     mask = np.zeros(mesh.n_vertices, dtype=bool)
-    mask[whole_numbers(chosen, "A vertex of a region", 0, mesh.n_vertices - 1)] = True
+    mask[numbers] = True
     return mask
 
 

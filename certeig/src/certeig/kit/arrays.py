@@ -250,3 +250,12 @@ def whole_numbers(value: ArrayLike, name: str, low: int, high: int) -> NDArray[n
     for suspect in numbers[(numbers < low) | (numbers > high)] if typed else numbers:
         whole_number(suspect, name, low, high)
     return numbers.astype(np.int64)
+
+
+def require_no_mask(numbers: NDArray[Any], name: str, n_points: int) -> None:
+    """Raise an error if numbers of points are the zeros and ones of a mask: they would name points 0 and 1."""
+    if 2 < len(numbers) == n_points and numbers.max() <= 1:
+        raise InvalidParameterError(
+            f"{name} must hold numbers of points; it has {n_points} entries, 0 or 1 for each point. "
+            "Pass np.flatnonzero(mask) for a mask."
+        )

@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
 
-from certeig.kit.arrays import as_array, freeze
+from certeig.kit.arrays import as_array, freeze, require_no_mask
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike
 
@@ -78,6 +78,7 @@ def require_points(fixed: ArrayLike, n_points: int, noun: str = "point") -> Int[
         raise InvalidParameterError(
             f"fixed must hold {noun}s 0..{n_points - 1}; entry {bad[0]} is {points[bad[0]]}."
         )
+    require_no_mask(points.ravel(), "fixed", n_points)
     return points.astype(np.int64)
 
 
