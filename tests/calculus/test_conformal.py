@@ -133,3 +133,14 @@ def test_a_head_with_thin_triangles_maps_to_the_sphere(data, monkeypatch):
     monkeypatch.setattr(conformal, "MOST_ROUNDS", 0)
     with pytest.raises(es.ConvergenceError, match="must not turn triangles over; it turns 11 of"):
         map_to_sphere(head)
+
+
+def test_a_face_that_hangs_on_an_edge_is_named():
+    ball = es.icosphere(3)
+    one, two, _ = ball.faces[0]
+    vertices = np.vstack([ball.vertices, 2 * ball.vertices[one]])
+    fin = es.TriangleMesh(vertices, [*ball.faces, [one, two, ball.n_vertices]])
+    with pytest.raises(
+        es.InvalidShapeError, match=rf"share edge \({min(one, two)}, {max(one, two)}\)"
+    ):
+        es.calculus.flatten_conformally(fin)
