@@ -11,7 +11,7 @@ from eigenshape._vectors import row_dots, scale_to_unit
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import vertex_normals
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.requirements import require_sound
+from eigenshape.geometry.requirements import require_sound, warn_of_seams
 from eigenshape.geometry.simplices import dual_volumes
 from eigenshape.geometry.topology import edge_table, neighbor_links
 
@@ -87,6 +87,7 @@ def gaussian_curvature(mesh: MeshLike) -> Float[np.ndarray, " n"]:
     """
     mesh = as_mesh(mesh)
     require_sound(mesh)
+    warn_of_seams(mesh)
     return angle_defects(mesh) / dual_volumes(mesh)
 
 
@@ -166,6 +167,7 @@ def principal_curvatures(mesh: MeshLike) -> PrincipalCurvatures:
     """
     mesh = as_mesh(mesh)
     require_sound(mesh)
+    warn_of_seams(mesh)
     normals = vertex_normals(mesh)
     flat = np.flatnonzero(~normals.any(axis=1))
     if flat.size:

@@ -21,7 +21,7 @@ from eigenshape.geometry.distances.geodesic_loops import (
     list_fans,
     spread_waves,
 )
-from eigenshape.geometry.requirements import require_describable
+from eigenshape.geometry.requirements import require_describable, warn_of_seams
 from eigenshape.geometry.samples.surface_points import SurfacePoints, require_on
 from eigenshape.geometry.simplices import dual_volumes
 from eigenshape.geometry.simplicial import Mesh
@@ -171,6 +171,7 @@ def geodesic_distances(
     [0.559, 0.9014, 1.82]
     """
     mesh = as_simplicial(mesh)
+    warn_of_seams(mesh)
     rows_of, radius = unchecked_rows(mesh), number_from_zero(reach, "reach")
     if isinstance(sources, SurfacePoints):
         require_on(mesh, sources, "sources")
@@ -243,6 +244,7 @@ def geodesic_waves(mesh: MeshLike) -> Wave:
     [0.0, 1.0, inf, 1.0, inf, inf, inf, inf, inf]
     """
     mesh = as_simplicial(mesh)
+    warn_of_seams(mesh)
     wave, n = unchecked_waves(mesh), mesh.n_points
 
     def checked_wave(source: ArrayLike, reach: float = np.inf) -> Float[np.ndarray, " n"]:
