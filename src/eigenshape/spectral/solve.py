@@ -1,5 +1,6 @@
 """The eigenpairs of a Laplacian: the lowest ones or those of an interval, certified or approximate."""
 
+import warnings
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal
@@ -33,7 +34,7 @@ from eigenshape.spectral.multilevel.approximate import (
     require_accuracy,
     require_lumped,
 )
-from eigenshape.spectral.pencils import normalize
+from eigenshape.spectral.pencils import LARGEST, normalize
 from eigenshape.spectral.spectrum import Spectrum
 
 Method = Literal["certified", "approximate"]
@@ -208,6 +209,13 @@ def solve_spectrum(  # noqa: PLR0913 - one keyword for each choice: which pairs,
             pairs, certificate = approximate_pairs(pencil, wanted, error, residual, report)
     report(1.0, "proved complete" if certificate.complete else "accurate enough")
     spectrum = spectrum_of(operator, pencil, pairs, certificate)
+    if wanted > 1 and not spectrum.eigenvalues.any():
+        warnings.warn(
+            f"All {wanted} eigenvalues are 0: the shape is in {wanted} pieces or more, each of which "
+            f"has one. Ask for more, or try {LARGEST}: it joins pieces that lie edge on edge, and "
+            "drops others.",
+            stacklevel=2,
+        )
     if cache is not None:
         keep(spectrum, cache, key)
     return _on_all_points(spectrum, laplacian, free)

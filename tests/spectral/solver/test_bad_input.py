@@ -15,6 +15,8 @@ from eigenshape.shapes.surfaces import icosphere
 from eigenshape.spectral.pencils import normalize
 from eigenshape.spectral.solve import solve_spectrum
 
+pytestmark = pytest.mark.filterwarnings("ignore:All .* eigenvalues are 0")  # of pieces
+
 TRIANGLE, PAIR = np.ones((3, 3)) - np.eye(3), np.ones((2, 2)) - np.eye(2)
 
 
@@ -358,3 +360,13 @@ def test_shapes_of_very_different_sizes_where_floats_suffice():
     assert len(solve_spectrum(two_sizes(1e8), below=1.0).eigenvalues) == 643
     moderate = solve_spectrum(two_sizes(1e3), 19).eigenvalues
     np.testing.assert_allclose(moderate, [0, 0, *1e-6 * one[1:]], rtol=1e-6, atol=1e-13)
+
+
+def test_a_spectrum_of_pieces_alone_is_said_to_be_one():
+    pieces = [TriangleMesh(icosphere(1).vertices + 3 * n, icosphere(1).faces) for n in range(4)]
+    laplacian = cotangent_laplacian(disjoint_union(*pieces))
+    with pytest.warns(
+        UserWarning, match="All 4 eigenvalues are 0: the shape is in 4 pieces or more"
+    ):
+        solve_spectrum(laplacian, 4)
+    assert solve_spectrum(laplacian, 5).eigenvalues[4] > 0

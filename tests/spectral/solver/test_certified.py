@@ -14,6 +14,8 @@ from eigenshape.spectral.certify import certify
 from eigenshape.spectral.pencils import normalize
 from eigenshape.spectral.solve import solve_spectrum
 
+pytestmark = pytest.mark.filterwarnings("ignore:All .* eigenvalues are 0")  # of pieces
+
 
 @pytest.fixture
 def always_lanczos(monkeypatch):

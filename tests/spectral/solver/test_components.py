@@ -16,6 +16,8 @@ from eigenshape.spectral.multilevel import approximate
 from eigenshape.spectral.pencils import normalize
 from eigenshape.spectral.solve import solve_spectrum
 
+pytestmark = pytest.mark.filterwarnings("ignore:All .* eigenvalues are 0")  # of pieces
+
 
 def moved(mesh: TriangleMesh, scale: float, along: float) -> TriangleMesh:
     return TriangleMesh(scale * mesh.vertices + [along, 0, 0], mesh.faces)

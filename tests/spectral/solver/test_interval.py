@@ -16,6 +16,8 @@ from eigenshape.spectral.signatures.heat import heat_kernel_signature
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 
+pytestmark = pytest.mark.filterwarnings("ignore:All .* eigenvalues are 0")  # of pieces
+
 
 @pytest.fixture
 def thin(monkeypatch):
