@@ -442,3 +442,23 @@ def test_landmarks_of_real_skulls_are_read_and_come_back(data, tmp_path):
     es.morphometrics.write_landmarks(skulls, tmp_path / "mice.csv")
     found = es.morphometrics.read_specimens(tmp_path / "mice.csv")
     assert all(same(found[name], skulls[name]) for name in skulls)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "code"),
+    [
+        ("a.tps", "LM3=2\n0 1.5 2\n-1 -1 -1\nID=a\n", "1 point with -1 for each"),
+        ("a.tps", "LM=3\n0 1.5\n-1 -1\n-1 -1\nID=a\n", "2 points with -1 for each"),
+        (
+            "a.csv",
+            "specimen,landmark,x,y,z\ns,a,0,1,2\ns,b,-9999,-9999,-9999\n",
+            "1 point with -9999 for each",
+        ),
+    ],
+)
+@pytest.mark.filterwarnings("ignore:.*in a plane")
+def test_codes_of_missing_points_are_named(name, text, code, tmp_path):
+    (tmp_path / name).write_text(text)
+    with pytest.warns(UserWarning, match=f"{code} coordinate may stand for missing ones"):
+        found = es.morphometrics.read_landmarks(tmp_path / name)
+    assert np.isfinite(found.points).all()

@@ -319,3 +319,10 @@ def test_real_skulls_are_fitted(data):
     growth = es.morphometrics.fit_allometry(fit.shapes, fit.sizes)
     assert growth.p_value < 0.01
     assert 0.02 < growth.share < 0.5
+
+
+def test_a_mesh_is_not_bent_by_landmarks_of_another_unit_without_a_word():
+    ball = es.icosphere(2)
+    corners = es.shapes.box(1, 1, 1).points
+    with pytest.warns(UserWarning, match="starts are 0.00087 times as large as the mesh"):
+        es.morphometrics.warp_mesh(ball, corners / 1000, corners / 999)

@@ -82,6 +82,13 @@ def test_groups_are_compared_by_all_divisions_of_both():
 
 
 @pytest.mark.long
+@pytest.mark.parametrize("missing", [None, np.nan])
+def test_a_specimen_without_a_group_is_no_group_of_its_own(missing):
+    shapes = np.random.default_rng(0).standard_normal((6, 4, 3))
+    with pytest.raises(es.InvalidParameterError, match=f"specimen; entry 4 is {missing}"):
+        es.morphometrics.compare_groups(shapes, ["a", "a", "b", "b", missing, missing])
+
+
 def test_groups_that_do_not_differ_have_all_p_values_and_those_that_do_small_ones():
     p_values = []
     for seed in range(12):

@@ -14,6 +14,7 @@ import numpy as np
 from certeig.kit.arguments import require_type
 from certeig.kit.errors import FileFormatError, InvalidParameterError
 from certeig.kit.files import as_path, read_regular, replace_file, require_lines
+from eigenshape._errors import count_nouns
 from eigenshape.morphometrics.landmark_parsers import (
     Parsed,
     Table,
@@ -48,6 +49,15 @@ FCSV_COLUMNS = "id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID"
 STATUS_COLUMN = 14
 PLACED, NOT_PLACED = "2", ("0", "3")  # PositionDefined; PositionUndefined, PositionMissing
 CSV_COLUMNS = ["specimen", "landmark", "x", "y", "z", "spread"]
+CODES = (
+    -1,
+    -9,
+    -99,
+    -999,
+    -9999,
+    999,
+    9999,
+)  # that programs and people write where a point is missing
 UNIT = "mm"  # of scenes and meshes of Slicer
 # Names of units, as UCUM, Slicer and Amira write them, by their length in nanometers: the ratio of
 # two whole numbers is rounded once
@@ -232,6 +242,15 @@ def _read_file(path: Path, unit: str, stacklevel: int) -> Table:
             f"{path} must hold landmarks: its structure differs, {err!r}"
         ) from err
     notes = list(notes)
+    points = np.concatenate([each.points for each in specimens.values()])
+    if not points[:, 2].any():  # in a plane
+        points = points[:, :2]
+    for code in CODES:
+        if count := int((points == code).all(axis=1).sum()):
+            notes.append(
+                f"{count_nouns(count, 'point')} with {code} for each coordinate may stand for missing "
+                "ones; if so, write NA there"
+            )
     if ratio != 1:
         specimens = {
             name: Landmarks(each.names, each.points * ratio, curves=each.curves)

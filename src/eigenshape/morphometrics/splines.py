@@ -1,5 +1,7 @@
 """Thin-plate splines in space: their bending energy, meshes that they bend, points that they fill in."""
 
+import warnings
+
 import numpy as np
 from jaxtyping import Float
 from scipy.interpolate import RBFInterpolator
@@ -11,9 +13,12 @@ from certeig.kit.errors import InvalidParameterError
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike
 from eigenshape._arrays import finite_rows
+from eigenshape._vectors import mean_radius
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.morphometrics.landmarks import complete_points
+
+OTHER_UNIT = 100.0  # ratio of sizes from which units differ: landmarks may be of a small place
 
 
 def bending_matrix(points: Float[np.ndarray, "k d"]) -> Float[np.ndarray, "k k"]:
@@ -90,4 +95,11 @@ def warp_mesh(mesh: MeshLike, starts: ArrayLike, ends: ArrayLike) -> TriangleMes
         )
     if len(places) > 3:  # what fewer lack, `fit_spline` says
         complete_points(places[None])
+        ratio = mean_radius(places) / mean_radius(mesh.vertices)
+        if not 1 / OTHER_UNIT < ratio < OTHER_UNIT:
+            warnings.warn(
+                f"starts are {ratio:.3g} times as large as the mesh, so both may be in different "
+                "units; bring them into that of the mesh.",
+                stacklevel=2,
+            )
     return TriangleMesh(fit_spline(places, goals, "starts")(mesh.vertices), mesh.faces)

@@ -210,6 +210,12 @@ def compare_groups(shapes: Specimens, groups: ArrayLike) -> GroupComparison:
     ('a', 'b') 0.008
     """
     points = complete_points(shapes)
+    for place, group in enumerate(np.asarray(groups, dtype=object).ravel()):
+        if group is None or (isinstance(group, float) and np.isnan(group)):
+            raise InvalidParameterError(
+                f"groups must give the group of each specimen; entry {place} is {group}. Leave "
+                "specimens without a group out."
+            )
     labels = as_array(groups, "groups").astype(str)
     names, members, counts = np.unique(labels, return_inverse=True, return_counts=True)
     if labels.shape != (len(points),) or len(names) < 2 or counts.min() < 2:
