@@ -2,7 +2,7 @@
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Complex, Float, Int
+from jaxtyping import Float, Int
 from scipy.sparse.linalg import spsolve
 
 from certeig.kit.arrays import EPS, real_numbers
@@ -10,10 +10,11 @@ from certeig.kit.errors import ConvergenceError, InvalidParameterError
 from certeig.kit.progress import Progress, silent
 from certeig.kit.typing import ArrayLike, Integer
 from eigenshape._arrays import require_finite_rows, step_number
-from eigenshape._corners import at_points, scaled_corners, triangular_sides
+from eigenshape._corners import at_points, scaled_corners, side_lengths, triangular_sides
 from eigenshape._errors import InvalidShapeError
 from eigenshape._vectors import row_dots, scale_to_unit, size_one, triangle_areas
 from eigenshape.calculus.linear_solver import LinearSolver, factor_definite
+from eigenshape.calculus.vector_heat import as_rows
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
@@ -122,11 +123,10 @@ def flatten_conformally(mesh: MeshLike) -> Float[np.ndarray, "n 2"]:
 
     # The lowest energy is double, since a rotation of the plane does not change it: any vector of
     # its eigenspace is a solution, and a single one converges to one.
-    found = _to_complex(np.random.default_rng(0).standard_normal(2 * mesh.n_vertices))
+    found = np.random.default_rng(0).standard_normal(2 * mesh.n_vertices).view(complex)
     for _ in range(MOST_ITERATIONS):
         before = found
-        right = np.stack([on_rim * found.real, on_rim * found.imag], axis=1)
-        found = _to_complex(solver.solve(right.ravel()))
+        found = solver.solve((on_rim * found).view(float)).view(complex)
         found = found - (on_rim @ found) / on_rim.sum()
         found /= np.sqrt(on_rim @ np.abs(found) ** 2)
         # Rotated back onto the last one, where the solution may have turned.
@@ -140,7 +140,7 @@ def flatten_conformally(mesh: MeshLike) -> Float[np.ndarray, "n 2"]:
             f"by {np.sqrt(on_rim @ np.abs(found - before) ** 2):.1e}. "
             'Try repair(mesh, ["collapse_needles"]).'
         )
-    plane = np.stack([found.real, found.imag], axis=1)
+    plane = as_rows(found)
     corners = plane[mesh.faces]
     one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     signed = ((one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]) / 2).sum()
@@ -240,8 +240,7 @@ def map_to_sphere(
             f"still differ by {least:.2g} of the radius. Pass a larger n_steps, or use a finer "
             "mesh."
         )
-    a, b, c = sphere[mesh.faces].transpose(1, 0, 2)
-    sides = np.linalg.norm([b - a, c - b, a - c], axis=2).max(axis=0)
+    sides = side_lengths(sphere[mesh.faces]).max(axis=1)
     pointlike = np.flatnonzero(sides <= ROUNDING)
     if pointlike.size:
         raise ConvergenceError(
@@ -272,7 +271,7 @@ def _turned_faces(mesh: TriangleMesh, sphere: Float[np.ndarray, "n 3"]) -> Int[n
         heights = -heights
     # Places on the sphere are rounded by about 1e-16, which decides how triangles lie whose height
     # is less.
-    sides = np.linalg.norm([b - a, c - b, a - c], axis=2).max(axis=0)
+    sides = side_lengths(sphere[mesh.faces]).max(axis=1)
     return np.flatnonzero(heights < -ROUNDING * sides)
 
 
@@ -372,7 +371,3 @@ def _factor(matrix: sp.csr_array) -> LinearSolver:
             "The equations of a conformal map must be definite up to rounding; faces are too thin "
             'for that. Try repair(mesh, ["collapse_needles"]).'
         ) from err
-
-
-def _to_complex(pairs: Float[np.ndarray, " n2"]) -> Complex[np.ndarray, " n"]:
-    return pairs[0::2] + 1j * pairs[1::2]

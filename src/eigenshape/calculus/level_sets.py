@@ -9,7 +9,7 @@ from certeig.kit.typing import ArrayLike
 from eigenshape._arrays import point_functions, vertex_values
 from eigenshape._corners import cut_tetrahedra, in_length, volumes
 from eigenshape._errors import InvalidShapeError
-from eigenshape._vectors import row_dots, size_one
+from eigenshape._vectors import area_vectors, row_dots, size_one
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.mesh import TriangleMesh
 
@@ -237,8 +237,7 @@ def level_set(mesh: MeshLike, values: ArrayLike, level: float) -> LevelSet:
     points = (1 - shares)[:, None] * one + shares[:, None] * two
     if mesh.dim == 3 and mesh.points.shape[1] == 3:
         # Values grow along the normals: the upper end of the first corner's edge is ahead.
-        a, b, c = size_one(points)[0][pieces].transpose(1, 0, 2)
-        normals = np.cross(b - a, c - a)
+        normals = area_vectors(size_one(points)[0][pieces])
         one, two = edges[pieces[:, 0]].T
         is_upper = heights[one] > heights[two]
         upper, lower = np.where(is_upper, one, two), np.where(is_upper, two, one)

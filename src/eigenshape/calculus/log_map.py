@@ -8,7 +8,7 @@ from jaxtyping import Complex, Float
 from certeig.kit.arguments import require_choice
 from certeig.kit.arrays import whole_number
 from certeig.kit.typing import Integer
-from eigenshape._corners import in_length, side_ends
+from eigenshape._corners import face_angles, in_length, side_ends
 from eigenshape.calculus.places import require_one, vertex_number
 from eigenshape.calculus.unfolding import flat_corners
 from eigenshape.calculus.vector_heat import (
@@ -26,7 +26,6 @@ from eigenshape.calculus.vector_heat import (
 )
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.samples.surface_points import SurfacePoints, require_on
-from eigenshape.operators.directions import corner_products
 
 LogMethod = Literal["affine", "adaptive", "radial"]
 
@@ -159,8 +158,7 @@ def _outward_field(solver: MeshVectorHeat, start: int) -> Complex[np.ndarray, " 
     faces, corners = np.nonzero(mesh.faces == start)
     side = 3 * faces + corners
     following, last = 3 * faces + (corners + 1) % 3, 3 * faces + (corners + 2) % 3
-    cosines, sines = corner_products(mesh)
-    angles = np.arctan2(sines, cosines)
+    angles = face_angles(mesh).ravel()
     theta = angles[side]
     # Twice the area over the sides of the face is its height over each.
     points = mesh.vertices[mesh.faces]

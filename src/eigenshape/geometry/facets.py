@@ -6,7 +6,7 @@ from jaxtyping import Bool, Int
 from eigenshape._arrays import label_components
 from eigenshape._corners import shared_facets
 from eigenshape._errors import InvalidShapeError
-from eigenshape._vectors import row_dots, size_one
+from eigenshape._vectors import area_vectors, row_dots, size_one
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.facet_lists import FacetTable
 from eigenshape.geometry.mesh import TriangleMesh
@@ -88,9 +88,8 @@ def boundary_surface(mesh: MeshLike) -> TriangleMesh:
     owner, apex = np.nonzero(table.n_simplices[table.simplex_facets] == 1)
     triangles = table.facets[table.simplex_facets[owner, apex]]
     points, _ = size_one(solid.points)
-    a, b, c = (points[corner] for corner in triangles.T)
-    inside = points[solid.simplices[owner, apex]]
-    inward = row_dots(np.cross(b - a, c - a), inside - a) > 0
+    towards_apex = points[solid.simplices[owner, apex]] - points[triangles[:, 0]]
+    inward = row_dots(area_vectors(points[triangles]), towards_apex) > 0
     triangles[inward] = triangles[inward][:, ::-1]
     used, renumbered = np.unique(triangles, return_inverse=True)
     return TriangleMesh(solid.points[used], renumbered.reshape(-1, 3))
@@ -142,6 +141,5 @@ def without_pinches(mesh: Mesh) -> SimplicialMesh:
     """
     points, fans = corner_fans(mesh)
     order = np.argsort(points, kind="stable")
-    places = np.empty(len(points), dtype=np.int64)
-    places[order] = np.arange(len(points))
+    places = np.argsort(order)
     return SimplicialMesh(mesh.points[points[order]], places[fans].reshape(mesh.simplices.shape))

@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from certeig.kit.arrays import ReadOnly, record
-from eigenshape._corners import edge_keys, scaled_corners, shared_facets, side_ends
+from eigenshape._corners import edge_keys, face_angles, scaled_corners, shared_facets, side_ends
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import (
     require_oriented_manifold,
@@ -51,8 +51,7 @@ def vertex_directions(mesh: TriangleMesh) -> Directions:
     inner[tails[boundary]] = False
 
     # Walk around all vertices at once, from side to side of a corner, and sum up the angles.
-    cosines, sines = corner_products(mesh)
-    angles = np.arctan2(sines, cosines)
+    angles = face_angles(mesh).ravel()
     at_tail, at_head = np.empty(len(angles)), np.empty(len(angles))
     around = np.zeros(mesh.n_vertices)
     walking, side = np.arange(mesh.n_vertices), first
@@ -68,19 +67,13 @@ def vertex_directions(mesh: TriangleMesh) -> Directions:
     return Directions(at_tail * scale[tails], at_head * scale[heads], first)
 
 
-def corner_products(mesh: TriangleMesh) -> tuple[Float[np.ndarray, " h"], Float[np.ndarray, " h"]]:
-    """Return the scalar product of the sides at each corner and the size of their vector product, up to one unit."""
-    corners, _ = scaled_corners(mesh)
-    to_next = np.roll(corners, -1, axis=1) - corners
-    to_last = np.roll(corners, 1, axis=1) - corners
-    sines = np.linalg.norm(np.cross(to_next, to_last), axis=2)
-    return np.einsum("fij,fij->fi", to_next, to_last).ravel(), sines.ravel()
-
-
 def half_cotangents(mesh: TriangleMesh) -> Float[np.ndarray, " h"]:
     """Return half of the cotangent opposite to each side."""
-    cosines, sines = corner_products(mesh)
-    return np.roll((cosines / sines).reshape(-1, 3), 1, axis=1).ravel() / 2
+    corners, _ = scaled_corners(mesh)
+    to_next, to_last = (np.roll(corners, -turn, axis=1) - corners for turn in (1, 2))
+    cosines = np.einsum("fij,fij->fi", to_next, to_last)
+    sines = np.linalg.norm(np.cross(to_next, to_last), axis=2)
+    return np.roll(cosines / sines, 1, axis=1).ravel() / 2
 
 
 def side_twins(mesh: TriangleMesh) -> Int[np.ndarray, " h"]:

@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from certeig.kit.threads import one_blas_thread
+from eigenshape._vectors import area_vectors
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.scans.raster import Raster
 
@@ -62,8 +63,7 @@ def draw_thumbnail(mesh: MeshLike) -> bytes:
     points *= scale
     points[:, :2] += size / 2 - middle * scale
     raster = Raster.of(points, mesh.faces, size, size)
-    corners = points[mesh.faces]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals = area_vectors(points[mesh.faces])
     lengths = np.linalg.norm(normals, axis=1)
     # Both sides of a face are lit alike, so that a scan with inward normals is not black.
     normals *= np.where(normals[:, 2] < 0, -1.0, 1.0)[:, None]
