@@ -81,8 +81,8 @@ def refine(
     values, k, m = below[1], goal.k, len(below[1])
     level = tower.levels[0]
     # M and A of the level below are PᵀMP and PᵀAP: P keeps orthonormality and Ritz values.
-    columns = np.empty((level.n, m), dtype=level.prolong.dtype)
-    multiply(level.prolong, np.ascontiguousarray(below[0], dtype=columns.dtype), columns)
+    coarse = np.ascontiguousarray(below[0], dtype=level.prolong.dtype)
+    columns = multiply(level.prolong, coarse)
 
     # The coarser level cannot improve its vectors further. So they are smoothed first, and replaced
     # by the Ritz vectors of their span.

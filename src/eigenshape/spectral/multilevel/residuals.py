@@ -51,11 +51,11 @@ def images(
     room = [np.empty((min(CHUNK_ROWS, level.n), columns.shape[1])) for _ in range(2)]
     for rows in chunks:
         image, weighed = (part[: rows.stop - rows.start] for part in room)
-        multiply(level.stiffness, columns, image, rows)
+        multiply(level.stiffness, columns, rows, image)
         if level.mass is None:
             np.multiply(columns[rows], level.weights[rows], out=weighed)
         else:
-            multiply(level.mass, columns, weighed, rows)
+            multiply(level.mass, columns, rows, weighed)
         yield rows, image, weighed
 
 
@@ -147,8 +147,7 @@ class Interpolated:
 
     def rows(self, rows: slice) -> np.ndarray:
         """Return some rows of the columns."""
-        product = np.empty((rows.stop - rows.start, self.below.shape[1]), dtype=np.float32)
-        return multiply(self.tower.levels[0].rough_prolong, self.below, product, rows)
+        return multiply(self.tower.levels[0].rough_prolong, self.below, rows)
 
     def pick(self, some: np.ndarray) -> np.ndarray:
         """Return some of the columns as a contiguous block."""
@@ -162,9 +161,7 @@ class Interpolated:
 
     def restrict(self, block: np.ndarray) -> np.ndarray:
         """Return Pᵀ times a block."""
-        matrix = self.tower.levels[0].rough_restrict
-        return multiply(matrix, block, np.empty((matrix.shape[0], block.shape[1]), np.float32))
+        return multiply(self.tower.levels[0].rough_restrict, block)
 
     def _prolong(self, block: np.ndarray) -> np.ndarray:
-        matrix = self.tower.levels[0].rough_prolong
-        return multiply(matrix, block, np.empty((matrix.shape[0], block.shape[1]), np.float32))
+        return multiply(self.tower.levels[0].rough_prolong, block)

@@ -48,12 +48,10 @@ def correct(
     that coarser levels cannot represent.
     """
     if tower.levels:
-        level, width = tower.levels[0], residual.shape[1]
-        restrict = level.rough_restrict
-        restricted = np.empty((restrict.shape[0], width), dtype=residual.dtype)
-        multiply(restrict, residual, restricted)
+        level = tower.levels[0]
+        restricted = multiply(level.rough_restrict, residual)
         below = correct(Tower(tower.levels[1:], tower.coarsest), restricted, shifts, INNER_STEPS)
-        start = multiply(level.rough_prolong, below, np.empty(residual.shape, residual.dtype))
+        start = multiply(level.rough_prolong, below)
         return smooth(tower, residual, shifts, steps, start)
 
     coarsest, right = tower.coarsest, residual.astype(np.float64)
@@ -103,10 +101,15 @@ def smooth(
 
 
 def multiply(
-    matrix: sp.csr_array, block: np.ndarray, product: np.ndarray, rows: slice | None = None
+    matrix: sp.csr_array,
+    block: np.ndarray,
+    rows: slice | None = None,
+    product: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Write the matrix times a block, or some rows of it, to `product`, and return it."""
+    """Return the matrix times a block, or some rows of it, in `product` if it is given."""
     begin, end = (rows.start, rows.stop) if rows else (0, matrix.shape[0])
+    if product is None:
+        product = np.empty((end - begin, block.shape[1]), matrix.dtype)
 
     def fill(share: tuple[int, int]) -> None:
         parts = matrix.indptr, matrix.indices, matrix.data
