@@ -191,6 +191,11 @@ def upward_direction(mesh: TriangleMesh, up: Up) -> Float[np.ndarray, "3"]:
     return _direction(up, "up", UP_NAMES)
 
 
+def is_auto(view: View, up: Up) -> bool:
+    """Tell whether neither a view nor an upward direction was chosen."""
+    return isinstance(view, str) and view == "auto" and isinstance(up, str) and up == "auto"
+
+
 def choose_camera(
     mesh: TriangleMesh, camera: Camera | None, view: View, up: Up, *, size: int = 600
 ) -> Camera:
@@ -201,7 +206,7 @@ def choose_camera(
     require_type(camera, Camera | None, "camera")
     if camera is None:
         return aim_camera(mesh, view=view, up=up, size=size)
-    if not (isinstance(view, str) and view == "auto" and isinstance(up, str) and up == "auto"):
+    if not is_auto(view, up):
         raise InvalidParameterError(
             "A camera determines the view, so view and up must not be passed with it. "
             "Pass camera, or view and up."

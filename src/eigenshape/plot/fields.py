@@ -93,7 +93,7 @@ def figure_eigenfunctions(
     if not chosen:
         raise InvalidParameterError("indices must name at least one eigenfunction; it is empty.")
     camera = choose_camera(mesh, camera, view, up, size=420)
-    figure, grid = _empty_grid(len(chosen), min(len(chosen), 4))
+    figure, grid = empty_grid(len(chosen), min(len(chosen), 4))
     colors, scale = mpl.colormaps["RdBu_r"], Normalize(-1, 1)
     for axes, index in zip(grid.flat, chosen, strict=False):
         function = spectrum.eigenvectors[:, index]
@@ -248,7 +248,7 @@ def figure_fields(  # noqa: PLR0913 - what is drawn, and one keyword for each ch
     scale, extend = value_scale(everything, limits)
     colors = mpl.colormaps[color_map].with_extremes(bad=NO_VALUE)
     n_columns = 2 if len(shapes) == 4 else min(len(shapes), 3)
-    figure, grid = _empty_grid(len(shapes), n_columns)
+    figure, grid = empty_grid(len(shapes), n_columns)
     for axes, (title, (mesh, field)) in zip(grid.flat, shapes.items(), strict=False):
         aimed = choose_camera(mesh, camera, view, up, size=420)
         show(axes, draw(mesh, aimed, vertex_colors=map_colors(field, scale, colors)))
@@ -258,14 +258,21 @@ def figure_fields(  # noqa: PLR0913 - what is drawn, and one keyword for each ch
     return figure
 
 
-def _empty_grid(n_drawings: int, n_columns: int) -> tuple[Figure, np.ndarray]:
+def empty_grid(n_drawings: int, n_columns: int, size: float = PANEL) -> tuple[Figure, np.ndarray]:
     """Return a figure with room for a color bar, and its axes, without frames: some rows of drawings."""
     n_rows = -(-n_drawings // n_columns)
-    figure = Figure(figsize=(PANEL * n_columns + 0.8, (PANEL + 0.3) * n_rows), layout="constrained")
+    figure = Figure(figsize=(size * n_columns + 0.8, (size + 0.3) * n_rows), layout="constrained")
     grid = figure.subplots(n_rows, n_columns, squeeze=False)
     for axes in grid.flat:
         axes.set_axis_off()
     return figure, grid
+
+
+def two_panels() -> tuple[Figure, Axes, Axes]:
+    """Return a figure of two large drawings side by side, and its axes."""
+    figure = Figure(figsize=(4.4 * PANEL, 2.2 * PANEL + 0.4), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    return figure, left, right
 
 
 def vertex_field(values: ArrayLike, mesh: TriangleMesh) -> np.ma.MaskedArray:

@@ -17,7 +17,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import dual_volumes
 from eigenshape.matching.shape_match import ShapeMatch
 from eigenshape.plot.camera import Camera, Up, View, aim_camera
-from eigenshape.plot.fields import PANEL, map_colors, show
+from eigenshape.plot.fields import PANEL, map_colors, show, two_panels
 from eigenshape.plot.figure import Figure
 from eigenshape.plot.render import draw
 from eigenshape.plot.spectra import draw_comparison
@@ -85,8 +85,7 @@ def figure_match(
             f"The match must be of the part; it has {match.n_vertices} vertices, and the part has "
             f"{part.n_vertices}."
         )
-    figure = Figure(figsize=(4.4 * PANEL, 2.2 * PANEL + 0.4), layout="constrained")
-    left, right = figure.subplots(1, 2)
+    figure, left, right = two_panels()
     colors = place_colors(whole.vertices)
     sure = match.confidence[:, None]
     pulled = np.where(match.mapped[:, None], sure * match.pull(colors) + (1 - sure) * GRAY, GRAY)

@@ -17,7 +17,7 @@ from eigenshape._arrays import vertex_values
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.plot.camera import Camera, Up, View, aim_camera, choose_camera
-from eigenshape.plot.fields import PANEL, mark, show
+from eigenshape.plot.fields import PANEL, empty_grid, mark, show, two_panels
 from eigenshape.plot.figure import Figure
 from eigenshape.plot.render import draw, palette
 from eigenshape.retrieval.labels.labeled_shape import LabeledShape
@@ -200,8 +200,7 @@ def figure_label_transfer(
     require_type(labeled, LabeledShape, "labeled")
     target = as_mesh(target, "target")
     require_type(transfer, LabelTransfer, "transfer")
-    figure = Figure(figsize=(4.4 * PANEL, 2.2 * PANEL + 0.4), layout="constrained")
-    left, right = figure.subplots(1, 2)
+    figure, left, right = two_panels()
     every = np.union1d(labeled.labels, transfer.labels)
     no_vertices = np.empty(0, dtype=np.int64)
     colors = np.searchsorted(every, labeled.labels)
@@ -276,18 +275,14 @@ def figure_poses(
     first = next(iter(meshes.values()))
     camera = choose_camera(first, camera, view, up)
     columns = min(len(poses), POSES_IN_A_ROW)
-    rows = -(-len(poses) // columns)
     size = 1.5 * PANEL if len(poses) <= 2 else PANEL  # a wider figure has titles too small to read
-    figure = Figure(figsize=(size * columns + 0.8, (size + 0.3) * rows), layout="constrained")
-    grid = figure.subplots(rows, columns, squeeze=False)
+    figure, grid = empty_grid(len(poses), columns, size)
     # The corners of the box that holds all poses, along the axes of the camera
     seen = np.vstack([mesh.vertices @ camera.rotation.T for mesh in meshes.values()])
     sides = zip(seen.min(axis=0), seen.max(axis=0), strict=True)
     corners = np.array(list(product(*sides))) @ camera.rotation
     # a new map for each call, because a map fills its table at first use and threads may share it
     colormap = LinearSegmentedColormap.from_list("moved", MOVED)
-    for axes in grid.flat:
-        axes.set_axis_off()
     for axes, (title, mesh) in zip(grid.flat, meshes.items(), strict=False):
         n = mesh.n_vertices
         values = np.zeros(n) if shares is None else vertex_values(shares, "shares", n)

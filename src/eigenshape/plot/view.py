@@ -6,7 +6,7 @@ from typing import Any
 from certeig.kit.typing import ArrayLike
 from eigenshape._extras import import_extra
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.plot.camera import Up, View
+from eigenshape.plot.camera import Up, View, is_auto
 
 
 def view(
@@ -65,6 +65,6 @@ def view(
     fields = values if isinstance(values, Mapping) else {"values": values}
     studio = import_extra("eigenshape_studio.widget", "'eigenshape-studio[notebook]'")
     widget = studio.ShapeWidget(surface, fields, height=height)
-    if not (isinstance(view, str) and view == "auto" and isinstance(up, str) and up == "auto"):
+    if not is_auto(view, up):
         widget.look_from(view, up)
     return widget
