@@ -80,9 +80,7 @@ class Parcellation(ReadOnly):
                 f"colors must be ({len(chosen)}, 4) numbers in 0..1, one row for each name; the shape "
                 f"is {shades.shape}."
             )
-        object.__setattr__(self, "labels", freeze(places))
-        object.__setattr__(self, "names", tuple(chosen))
-        object.__setattr__(self, "colors", freeze(shades))
+        vars(self).update(labels=freeze(places), names=tuple(chosen), colors=freeze(shades))
 
     def require_vertices(self, n_vertices: int) -> None:
         """Raise an error if the parcels are not those of a surface with so many vertices.

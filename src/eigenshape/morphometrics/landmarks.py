@@ -95,10 +95,8 @@ class Landmarks(ReadOnly):
                     f"spread must be {len(names)} numbers, one for each point, each at least 0 or "
                     f"NaN; it is {widths.tolist()}."
                 )
-        object.__setattr__(self, "names", names)
-        object.__setattr__(self, "points", freeze(places))
-        object.__setattr__(self, "spread", widths)
-        object.__setattr__(self, "curves", as_curves(curves, len(names)))
+        curves = as_curves(curves, len(names))
+        vars(self).update(names=names, points=freeze(places), spread=widths, curves=curves)
 
 
 Specimens = TypeAliasType("Specimens", Mapping[str, Landmarks] | Sequence[Landmarks] | ArrayLike)

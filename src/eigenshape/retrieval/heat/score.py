@@ -39,8 +39,7 @@ class HeatDescriptor(ReadOnly):
     recipe: HeatRecipe
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "vectors", freeze(self.vectors))
-        object.__setattr__(self, "vertices", freeze(self.vertices))
+        vars(self).update(vectors=freeze(self.vectors), vertices=freeze(self.vertices))
 
 
 NUMBERS_AT_ONCE = 4_000_000  # distances held at a time: 32 MB

@@ -143,8 +143,7 @@ class LabeledShape(ReadOnly):
     def __post_init__(self) -> None:
         mesh = as_mesh(self.mesh)
         labels = face_labels(self.labels, "labels", mesh)
-        object.__setattr__(self, "mesh", mesh)
-        object.__setattr__(self, "labels", freeze(labels.astype(np.int64)))
+        vars(self).update(mesh=mesh, labels=freeze(labels.astype(np.int64)))
 
     @cached_property
     def points(self) -> LabelPoints:
