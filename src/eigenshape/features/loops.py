@@ -11,9 +11,7 @@ from certeig.kit.arrays import record
 from eigenshape._arrays import label_components
 from eigenshape.features.merge_loops import spanning_forest
 from eigenshape.geometry.facets import facet_table
-from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import Mesh
-from eigenshape.geometry.topology import edge_table
 
 
 def extended_loops(mesh: Mesh, order: Int[np.ndarray, " n"]) -> Int[np.ndarray, "loops 2"] | None:
@@ -90,12 +88,8 @@ def _build_complex(mesh: Mesh) -> _Complex | None:
         return _Complex(edges, np.zeros_like(edges), 0)
     if mesh.dim != 2:
         return None
-    if isinstance(mesh, TriangleMesh):
-        table = edge_table(mesh)
-        edges, face_edges, counts = table.edges, table.face_edges, table.n_faces
-    else:
-        facets = facet_table(mesh)
-        edges, face_edges, counts = facets.facets, facets.simplex_facets, facets.n_simplices
+    table = facet_table(mesh)
+    edges, face_edges, counts = table.facets, table.simplex_facets, table.n_simplices
     if counts.max() > 2:
         return None
     sides = np.full((len(edges), 2), len(face_edges))

@@ -126,10 +126,9 @@ def spectral_clusters(
             left, _, right = sl.svd(sums)
             centers = left @ right
     # Label 0 is that of point 0, 1 that of the next point with another one, and so on.
-    names, first, inverse = np.unique(labels, return_index=True, return_inverse=True)
-    numbers = np.empty(len(names), dtype=np.int64)
-    numbers[np.argsort(first)] = np.arange(len(names))
-    return numbers[inverse]
+    _, first, inverse = np.unique(labels, return_index=True, return_inverse=True)
+    ranks = np.argsort(np.argsort(first))
+    return ranks[inverse]
 
 
 def count_clusters(spectrum: Spectrum, most: int | None = None) -> int:
