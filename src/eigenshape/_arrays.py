@@ -127,17 +127,15 @@ def point_functions(value: ArrayLike, name: str, n_points: int) -> NDArray[np.fl
     return all_finite(values, name)
 
 
-def simplex_vectors(
-    value: ArrayLike, name: str, n_simplices: int, ambient: int
-) -> NDArray[np.float64]:
-    """Return `value` as finite float64 numbers: one vector per simplex, or k of them, (s, d, k)."""
-    vectors = real_numbers(value, name)
+def simplex_vectors(value: ArrayLike, n_simplices: int, ambient: int) -> NDArray[np.float64]:
+    """Return `vectors` as finite float64 numbers: one per simplex, or k of them, (s, d, k)."""
+    vectors = real_numbers(value, "vectors")
     if vectors.ndim not in (2, 3) or vectors.shape[:2] != (n_simplices, ambient):
         raise InvalidParameterError(
-            f"{name} must hold one vector per simplex, shape ({n_simplices}, {ambient}) or "
+            f"vectors must hold one vector per simplex, shape ({n_simplices}, {ambient}) or "
             f"({n_simplices}, {ambient}, k) for k fields; the shape is {vectors.shape}."
         )
-    return all_finite(vectors, name)
+    return all_finite(vectors, "vectors")
 
 
 def face_labels(value: ArrayLike, name: str, mesh: Any) -> NDArray[Any]:
@@ -168,9 +166,9 @@ def require_finite_rows(rows: NDArray[np.float64], name: str, noun: str) -> None
         raise InvalidParameterError(f"{name} must be finite; that of {noun} {row} is {value}.")
 
 
-def step_number(value: Integer, name: str) -> int:
-    """Return `value` as an int from 1 to a million, the number of steps of a loop."""
-    return whole_number(value, name, 1, MOST_STEPS, "no shape needs more steps")
+def step_number(n_steps: Integer) -> int:
+    """Return `n_steps`, the number of steps of a loop, as an int from 1 to a million."""
+    return whole_number(n_steps, "n_steps", 1, MOST_STEPS, "no shape needs more steps")
 
 
 def label_components(

@@ -55,12 +55,12 @@ def test_vertex_values_are_one_finite_number_a_vertex():
 
 
 def test_a_bound_with_a_reason_is_named_with_it():
-    assert step_number(np.int16(3), "n_steps") == 3
+    assert step_number(np.int16(3)) == 3
     with pytest.raises(InvalidParameterError, match="n_steps must be at least 1; it is 0"):
-        step_number(0, "n_steps")
+        step_number(0)
     message = "n_steps must be at most 1000000, because no shape needs more steps; it is 1000001"
     with pytest.raises(InvalidParameterError, match=message):
-        step_number(1_000_001, "n_steps")
+        step_number(1_000_001)
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,6 @@ import pytest
 from eigenshape._errors import InvalidShapeError
 from eigenshape._vectors import scale_to_unit
 from eigenshape.geometry.measure import (
-    bounding_box,
     edge_lengths,
     enclosed_volume,
     face_areas,
@@ -87,14 +86,6 @@ def test_all_points_equal_have_no_size():
     points, scale = scale_to_unit(np.zeros((3, 3)))
     assert scale == 1
     assert not points.any()
-
-
-def test_the_box_is_around_loose_vertices_too():
-    low, high = bounding_box(
-        TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [-5, 0, 7]], [[0, 1, 2]])
-    )
-    assert low.tolist() == [-5, 0, 0]
-    assert high.tolist() == [1, 1, 7]
 
 
 def test_normals_are_zero_where_there_is_no_area():

@@ -203,7 +203,7 @@ def map_to_sphere(
     1.0
     """
     mesh = as_mesh(mesh)
-    most = step_number(n_steps, "n_steps")
+    most = step_number(n_steps)
     require_sound(mesh)
     require_oriented_manifold(mesh)
     euler, (n_components, _) = euler_characteristic(mesh), vertex_components(mesh)

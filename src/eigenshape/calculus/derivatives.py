@@ -144,7 +144,7 @@ def divergence(
     weighted = gradients * volumes[:, None, None]
     if vectors is None:
         return _point_rows(mesh, -weighted)
-    field = simplex_vectors(vectors, "vectors", len(mesh.simplices), mesh.points.shape[1])
+    field = simplex_vectors(vectors, len(mesh.simplices), mesh.points.shape[1])
     return sum_at_nodes(
         mesh.simplices, mesh.n_points, -np.einsum("sad,sd...->sa...", weighted, field)
     )
@@ -229,7 +229,7 @@ def curl(
         weights = np.cross(weighted, face_normals(surface)[:, None, :])
     if vectors is None:
         return _point_rows(mesh, weights)
-    field = simplex_vectors(vectors, "vectors", len(mesh.simplices), ambient)
+    field = simplex_vectors(vectors, len(mesh.simplices), ambient)
     rule = "sad,sd...->sa..." if weights.ndim == 3 else "said,sd...->sai..."
     return sum_at_nodes(mesh.simplices, mesh.n_points, np.einsum(rule, weights, field))
 

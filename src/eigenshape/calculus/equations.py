@@ -242,7 +242,7 @@ def solve_heat(  # noqa: PLR0913 - one keyword for each part of the equation
     [0.0, 0.25, 0.5, 0.75, 1.0]
     """
     require_matrix(laplacian)
-    count = step_number(n_steps, "n_steps")
+    count = step_number(n_steps)
     time = positive_number(t, "t")
     current = point_functions(start, "start", laplacian.n_points)
     step = time / count

@@ -92,7 +92,7 @@ def mean_curvature_flow(
     """
     mesh = as_mesh(mesh)
     time = positive_number(t, "t")
-    count = step_number(n_steps, "n_steps")
+    count = step_number(n_steps)
     points, scale = size_one(mesh.vertices)
     step = time / count / scale / scale
     held = require_points(boundary_vertices(mesh) if fixed is None else fixed, mesh.n_vertices)
@@ -175,7 +175,7 @@ def taubin_smooth(
     True
     """
     mesh = as_simplicial(mesh)
-    count = step_number(n_steps, "n_steps")
+    count = step_number(n_steps)
     weight = finite_number(shrink, "shrink")
     back = finite_number(inflate, "inflate")
     if not 0 < weight <= 1 or not back < -weight:

@@ -5,7 +5,6 @@ from jaxtyping import Float
 
 from eigenshape._corners import in_length, mean_normals, scaled_corners
 from eigenshape._vectors import area_vectors, row_dots, size_one, triangle_areas, unit_vectors
-from eigenshape.geometry.cloud import Shape
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.requirements import require_oriented
 from eigenshape.geometry.topology import edge_table
@@ -191,8 +190,3 @@ def edge_lengths(mesh: MeshLike) -> Float[np.ndarray, " e"]:
     mesh = as_mesh(mesh)
     ends, scale = size_one(mesh.vertices[edge_table(mesh).edges])
     return in_length(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1), scale, 1)
-
-
-def bounding_box(shape: Shape) -> tuple[Float[np.ndarray, " d"], Float[np.ndarray, " d"]]:
-    """Return the lowest and the highest corner of the box around all points."""
-    return shape.points.min(axis=0), shape.points.max(axis=0)

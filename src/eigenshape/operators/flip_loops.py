@@ -38,17 +38,6 @@ def fill_cotangents(lengths: Lengths, found: Out[Lengths]) -> None:
     """Fill the cotangents of the angles opposite to the sides."""
 
 
-def flip_to_delaunay(
-    tails: Sides, twins: Sides, lengths: Lengths, tolerance: float, most: int
-) -> int:
-    """Flip edges in place until all are Delaunay; return the number of flips.
-
-    Edges are flipped in the order in which they are found. Returns -1 after more than `most` flips.
-    """
-    queue, waiting = np.empty(len(tails), dtype=np.int64), np.zeros(len(tails), dtype=np.bool_)
-    return flip_edges(tails, twins, lengths, tolerance, most, queue, waiting)
-
-
 @kernel("n")
 def flip_edges(
     tails: Out[Sides],
@@ -59,4 +48,8 @@ def flip_edges(
     queue: Out[Sides],
     waiting: Out[Bool[np.ndarray, " n"]],
 ) -> int:
-    """Flip as `flip_to_delaunay`; the last two are scratch, and `waiting` comes filled with False."""
+    """Flip edges in place until all are Delaunay; return the number of flips.
+
+    Edges are flipped in the order in which they are found. Returns -1 after more than `most` flips.
+    The last two arrays are scratch, and `waiting` comes filled with False.
+    """

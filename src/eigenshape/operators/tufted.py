@@ -119,7 +119,8 @@ def flip_to_delaunay(cover: Triangulation, tolerance: float = TOLERANCE) -> Tria
     """
     tails, twins, lengths = cover.tails.copy(), cover.twins.copy(), cover.lengths.copy()
     most = MOST_FLIPS * len(tails)
-    if flip_loops.flip_to_delaunay(tails, twins, lengths, tolerance, most) < 0:
+    queue, waiting = np.empty(len(tails), np.int64), np.zeros(len(tails), bool)
+    if flip_loops.flip_edges(tails, twins, lengths, tolerance, most, queue, waiting) < 0:
         raise ConvergenceError(
             f"Flips to Delaunay must end; {most} flips of {len(tails) // 2} edges did not."
         )

@@ -7,7 +7,7 @@ import numpy as np
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.face_turns import inconsistent_edges
-from eigenshape.geometry.measure import bounding_box, edge_lengths, enclosed_volume, surface_area
+from eigenshape.geometry.measure import edge_lengths, enclosed_volume, surface_area
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair import suggest_repairs
 from eigenshape.geometry.repairs.repair_steps import drop_duplicate_points
@@ -39,7 +39,7 @@ def shape_facts(shape: Shape) -> dict[str, Any]:
         facts = _cloud_facts(shape)
     else:
         facts = _simplicial_facts(shape)
-    low, high = bounding_box(shape)
+    low, high = shape.points.min(axis=0), shape.points.max(axis=0)
     facts |= {"box_low": low.tolist(), "box_high": high.tolist()}
     return facts | {"repairs_to_try": list(suggest_repairs(shape))}
 
