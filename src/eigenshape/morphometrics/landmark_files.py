@@ -191,7 +191,7 @@ def read_specimens(path: str | Path, *, unit: str = UNIT) -> dict[str, Landmarks
     return _read_file(path, unit, stacklevel=3)
 
 
-def read_folder(folder: Path, unit: str = UNIT, without: Path | None = None) -> Table:
+def read_folder(folder: Path, unit: str, without: Path | None = None) -> Table:
     """Return the landmarks of all files in a folder, but not of those below another one.
 
     Raise InvalidParameterError if a specimen has two files, or landmarks of specimens differ.

@@ -706,7 +706,7 @@ class ShapeIndex:
         export_index(state, _records(state, chosen), Path(folder))
 
 
-def _records(state: IndexState, chosen: set[int] | None = None) -> list[Record]:
+def _records(state: IndexState, chosen: set[int] | None) -> list[Record]:
     """Return what is known of the chosen shapes, or of all, sorted by name."""
     used: dict[int, set[int]] = {}
     rows = state.descriptors

@@ -127,7 +127,7 @@ def _visible_part(
     direction: Float[np.ndarray, "3"],
     resolution: int = RESOLUTION,
     *,
-    all_pieces: bool = False,
+    all_pieces: bool,
 ) -> MeshPart:
     """Keep what is visible of a mesh from a unit direction, as `partial_scan` does."""
     points = scale_to_unit(mesh.vertices)[0] @ rotation_towards(direction).T

@@ -16,7 +16,7 @@ def machine_memory() -> float:
         return 8 * 2.0**30
 
 
-def available_memory(share: float = SHARE_OF_MEMORY) -> float:
+def available_memory(share: float) -> float:
     """Return the bytes that a task may take, as a share of the memory of the machine."""
     return share * machine_memory()
 

@@ -121,7 +121,7 @@ class Pencil:
         return replace(pencil, saturation=saturation, origin=origin)
 
     @classmethod
-    def unscaled(cls, stiffness: sp.sparray, mass: sp.sparray, advice: Advice = ADVICE) -> "Pencil":
+    def unscaled(cls, stiffness: sp.sparray, mass: sp.sparray, advice: Advice) -> "Pencil":
         """Make a pencil without scaling, for entries that are already of moderate size.
 
         Raises an InvalidParameterError if B is not positive definite.
@@ -160,10 +160,6 @@ class Pencil:
         """Return eigenvalues, given as the user has them, in the pencil's units."""
         return np.ldexp(values - self.origin, -self.value_exponent)
 
-    def vectors_out(self, vectors: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
-        """Return B-normalized vectors in the user's units."""
-        return np.ldexp(vectors, self.vector_exponent)
-
     def certificate_out(self, certificate: Certificate) -> Certificate:
         """Return the certificate with every value in the user's units."""
         shift, floor, low, high = self.places_out(
@@ -199,7 +195,7 @@ class Pencil:
             signs[columns] = np.where(part[leading, np.arange(part.shape[1])] < 0, -1.0, 1.0)
 
         map_in_threads(choose_signs, column_chunks(vectors.shape[1]))
-        vectors *= self.vectors_out(signs[None])
+        vectors *= np.ldexp(signs, self.vector_exponent)
         vectors.flags.writeable = False
         return vectors
 

@@ -54,7 +54,7 @@ def choose_candidates(
     allowed: Bool[np.ndarray, " n"],
     isolations: Float[np.ndarray, " n"],
     options: QueryOptions,
-    supplier: Supplier | None = None,
+    supplier: Supplier | None,
 ) -> Candidates:
     """Choose the shapes that are compared exactly with a query.
 

@@ -147,7 +147,7 @@ def read_integers(
     database: sqlite3.Connection,
     seal: Seal,
     damages: list[Damage],
-    before: np.ndarray | None = None,
+    before: np.ndarray | None,
 ) -> np.ndarray:
     """Return the integers of all descriptors, by their numbers; damage is appended to a list.
 

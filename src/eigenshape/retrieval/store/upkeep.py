@@ -125,7 +125,7 @@ def compact_index(folder: Path) -> int:
         return number("page_size") * (before - number("page_count"))
 
 
-def merge_indexes(folder: Path, others: Sequence[Path], *, replace: bool = False) -> int:
+def merge_indexes(folder: Path, others: Sequence[Path], *, replace: bool) -> int:
     """Add the shapes of other indexes in one transaction; return how many were added.
 
     What is damaged in them is left out, with a warning.

@@ -191,7 +191,7 @@ class KnownEigenvalues:
 def known_eigenvalues(
     spectrum: Spectrum | ArrayLike,
     name: str,
-    brackets: Brackets | None = None,
+    brackets: Brackets | None,
     k: int | None = None,
 ) -> KnownEigenvalues:
     """Return what is known of the lowest k eigenvalues: by residuals of a spectrum, or by brackets.
