@@ -25,6 +25,7 @@ from threadpoolctl import threadpool_limits
 from certeig.kit.arguments import require_type
 from certeig.kit.arrays import positive_values, whole_number
 from certeig.kit.errors import CerteigError
+from certeig.kit.memory import machine_memory
 from certeig.kit.text import html_repr, repr_of_changes
 from certeig.kit.threads import set_threads, thread_count
 
@@ -295,10 +296,10 @@ def _memory_of_each(workers: Workers) -> int | None:
         return int(workers.memory)
     if sys.platform != "linux":
         return None
-    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // workers.count
+    return int(machine_memory()) // workers.count
 
 
-def _start_worker(memory: int | None, prepare: Callable[[], object] | None = None) -> None:
+def _start_worker(memory: int | None, prepare: Callable[[], object] | None) -> None:
     if memory is not None and sys.platform == "linux":
         import resource  # noqa: PLC0415  there is none on Windows
 

@@ -84,8 +84,12 @@ class LinearSolver(ReadOnly):
     _constraints: "Constraints | None" = None
 
     def __repr__(self) -> str:
-        count = 0 if self._constraints is None else self._constraints.matrix.shape[0]
-        return f"LinearSolver({self.n_points} points, {len(self.fixed)} fixed, {count} constraints)"
+        numbers = f"{len(self.fixed)} fixed, {self._n_constraints} constraints"
+        return f"LinearSolver({self.n_points} points, {numbers})"
+
+    @property
+    def _n_constraints(self) -> int:
+        return 0 if self._constraints is None else self._constraints.matrix.shape[0]
 
     def solve(
         self, right: ArrayLike = 0.0, *, values: ArrayLike = 0.0, targets: ArrayLike = 0.0
@@ -117,8 +121,7 @@ class LinearSolver(ReadOnly):
         """
         load = _columns(right, "right", self.n_points, "point")
         given = _columns(values, "values", len(self._given), "fixed point")
-        n_constraints = 0 if self._constraints is None else len(self._constraints.response.T)
-        wanted = _columns(targets, "targets", n_constraints, "constraint")
+        wanted = _columns(targets, "targets", self._n_constraints, "constraint")
         widths = {each.shape[1] for each in (load, given, wanted)} - {1}
         if len(widths) > 1:
             raise InvalidParameterError(
@@ -406,7 +409,7 @@ def factor_system(
     floating: Int[np.ndarray, " n"],
     weights: ArrayLike | None = None,
     *,
-    indefinite: bool = False,
+    indefinite: bool,
 ) -> LinearSolver:
     """Factor a symmetric system whose components that float are known, -1 elsewhere.
 

@@ -25,7 +25,6 @@ from eigenshape.matching.nearest import RowTree
 # were chosen on the tuning half of experiments/ch7_collection: skulls, whole, and cut by planes.
 N_POINTS, N_ROUGH = 1200, 240  # of the surface that is placed, for its refined and rough places
 N_WHOLE = 6000, 1200  # of the whole; denser, since a gap ends at the nearest point
-NORMAL_WEIGHT = 0.15  # length of a normal beside a place
 N_TURNS = 32  # random ones, after the four that align the principal axes
 OFFSET = 0.5  # of further starts along the axes: the middle of a part is not that of the whole
 SIZES = (1.0, 0.77)  # of a part at the start, as shares of what its own extent gives
@@ -278,7 +277,7 @@ def _points_in_own_size(
     middle = spread.points.mean(axis=0)
     size = mean_radius(spread.points)
     return (
-        join_normals((spread.points - middle) / size, spread.normals, NORMAL_WEIGHT),
+        join_normals((spread.points - middle) / size, spread.normals),
         middle,
         size,
     )

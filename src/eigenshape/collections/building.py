@@ -15,7 +15,7 @@ from jaxtyping import Float, Int
 from certeig.kit.arguments import require_type, require_unicode
 from certeig.kit.errors import CerteigError, InvalidParameterError
 from certeig.kit.files import as_path, content_digest
-from certeig.kit.progress import Callback
+from certeig.kit.progress import Callback, ignore
 from certeig.kit.threads import one_blas_thread
 from eigenshape._errors import InvalidShapeError
 from eigenshape._sealed import explained
@@ -285,7 +285,7 @@ class _Run:
         self, folder: Path, workers: Workers | None, callback: Callback | None, n_items: int
     ) -> None:
         self.folder, self.workers = folder, workers
-        self.callback = callback or _ignore
+        self.callback = callback or ignore
         self.n_items, self.n_done, self.n_rounds = n_items, 0, 0
         self.failures: dict[str, str] = {}
         self.kept, self.template = read_fits(folder)
@@ -352,10 +352,6 @@ def _outcome(work: Callable[[Path], T], path: Path) -> Outcome[T]:
         return Outcome(work(path))
     except (CerteigError, OSError) as err:
         return Outcome(error=str(err))
-
-
-def _ignore(n_done: int, n_steps: int, name: str, error: str | None) -> None:
-    """Do nothing after a step."""
 
 
 def _find_specimens(

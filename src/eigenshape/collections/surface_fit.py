@@ -36,11 +36,9 @@ from eigenshape.geometry.topology import boundary_vertices, edge_table
 from eigenshape.matching.match import match_shapes
 from eigenshape.matching.target import prepare_target
 
+
 # Lengths are in units of the root mean square distance of the placed source from its middle. All
 # numbers were chosen on the tuning half of experiments/ch7_collection.
-NORMAL_WEIGHT = 0.15  # length of a normal beside a place
-
-
 class Level(NamedTuple):
     """One step from coarse to fine."""
 
@@ -282,10 +280,8 @@ def bend_onto(
         pairing = None
         for _ in range(n_rounds):
             normals = unit_vectors(area_vectors(vertices[faces]))
-            with_normals = join_normals(points, normals, NORMAL_WEIGHT)
-            pairing = pairing or Pairing(
-                with_normals, join_normals(ends, theirs.normals, NORMAL_WEIGHT)
-            )
+            with_normals = join_normals(points, normals)
+            pairing = pairing or Pairing(with_normals, join_normals(ends, theirs.normals))
             start, end, distances = pairing.pair(with_normals)
             facing = theirs.normals[end]
             weights = (1 + (distances / reach) ** 2) ** -2

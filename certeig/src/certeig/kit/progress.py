@@ -12,3 +12,7 @@ Callback = TypeAliasType("Callback", Callable[[int, int, str, str | None], None]
 
 def silent(fraction: float, message: str) -> None:
     """Report to nobody."""
+
+
+def ignore(n_done: int, n_items: int, name: str, error: str | None) -> None:
+    """Do nothing after a file of a batch."""

@@ -17,7 +17,7 @@ from typing_extensions import TypeAliasType
 from certeig.kit.arguments import require_each, require_type
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.files import content_digest
-from certeig.kit.progress import Callback
+from certeig.kit.progress import Callback, ignore
 from certeig.kit.text import Shown
 from certeig.kit.typing import Integer
 from eigenshape._workers import Item as Item  # noqa: PLC0414 - the room lists it from here
@@ -194,7 +194,7 @@ def build_index(  # noqa: PLR0913 - one keyword for each choice of a batch
                 f"{paths[item.name]} and {item.path}."
             )
         paths[item.name] = item.path
-    callback = callback or _ignore
+    callback = callback or ignore
 
     taught: dict[str, Outcome[_ReadFile]] = {}
     if learn and not index.recipes():
@@ -291,7 +291,7 @@ def train_codebook_from_files(
     require_type(workers, Workers, "workers")
     require_each(items, Item, "items")
     read_item = partial(_read_repaired, read, require_repairs(repairs))
-    taught = _read_teachers(items, read_item, N_TRAINING_VIEWS, workers, callback or _ignore)
+    taught = _read_teachers(items, read_item, N_TRAINING_VIEWS, workers, callback or ignore)
     return _learn_from(taught.values())
 
 
@@ -454,7 +454,3 @@ def _update_known(
     if changed:  # a change takes the lock of the index, also one of nothing
         index.update(changed)
     return todo
-
-
-def _ignore(n_done: int, n_items: int, name: str, error: str | None) -> None:
-    """Do nothing after a file."""
