@@ -42,7 +42,7 @@ class Source:
         return len(self.codes)
 
     def rows_of(self, places, *, checked=False):
-        return [pack_codes(self.codes[place].reshape(-1, WIDTH)) for place in places]
+        return [pack_codes(self.codes[place]) for place in places]
 
     def beside(self, name):
         return self.folder / name

@@ -115,7 +115,7 @@ def row_type(recipe: AnyRecipe) -> "np.dtype[Any]":
 def rows_of(descriptor: Descriptor, name: str) -> np.ndarray:
     """Return the (m, q) numbers that are stored as rows; `name` is for error messages."""
     if isinstance(descriptor, PatchDescriptor):
-        return pack_codes(descriptor.codes.reshape(-1, descriptor.codes.shape[-1]))
+        return pack_codes(descriptor.codes)
     vectors = descriptor.vectors
     with np.errstate(over="ignore"):
         rows = vectors.astype(row_type(descriptor.recipe))

@@ -108,7 +108,7 @@ def test_steps_of_size_are_found_and_have_a_price():
 
 
 def distances(query, others):
-    return packed_distances(query, [pack_codes(other.reshape(-1, 64)) for other in others])
+    return packed_distances(query, [pack_codes(other) for other in others])
 
 
 def test_a_view_counts_by_half():
@@ -128,7 +128,7 @@ def test_packed_codes_have_the_same_distances():
     query, *others = (
         rng.integers(-7, 8, (count, 3, 3, 64), dtype=np.int8) for count in (3, 4, 1, 2)
     )
-    packed = [pack_codes(other.reshape(-1, 64)) for other in others]
+    packed = [pack_codes(other) for other in others]
     assert [rows.shape for rows in packed] == [(36, 32), (9, 32), (18, 32)]
     expected = []
     for other in others:

@@ -79,7 +79,7 @@ def test_the_nearest_view_of_the_query_serves_against_a_part(wholes, scan):
 
 def test_views_of_the_query_serve_against_parts(wholes, scan):
     whole, other, part = wholes[1].codes, wholes[0].codes, scan.codes
-    packed = [pack_codes(codes.reshape(-1, codes.shape[-1])) for codes in (part, other)]
+    packed = [pack_codes(codes) for codes in (part, other)]
     found = packed_distances(whole, packed)
     own = patch_distances(whole[0], np.array([part[0], other[0]]))
     nearest = min(own[0], *(patch_distances(view, part)[0] for view in whole[1:]))

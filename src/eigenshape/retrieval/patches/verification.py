@@ -101,7 +101,7 @@ def patch_scores(
     require_type(query, PatchDescriptor, "query")
     require_each(others, PatchDescriptor, "others")
     with one_blas_thread():
-        packed = [pack_codes(other.codes.reshape(-1, other.codes.shape[-1])) for other in others]
+        packed = [pack_codes(other.codes) for other in others]
         # The isolation of each shape among the others, as in an index of them: copies count once.
         checksums = np.array([crc32(rows.tobytes()) for rows in packed], dtype=np.int64)
         distinct, firsts, inverse = np.unique(checksums, return_index=True, return_inverse=True)
