@@ -25,7 +25,7 @@ def size_one(coordinates: Float[np.ndarray, "..."]) -> tuple[Float[np.ndarray, "
     return coordinates / scale, scale
 
 
-def scale_to_unit(points: Float[np.ndarray, "n 3"]) -> tuple[Float[np.ndarray, "n 3"], float]:
+def scale_to_unit(points: Float[np.ndarray, "n d"]) -> tuple[Float[np.ndarray, "n d"], float]:
     """Return points relative to their mean, scaled to size 1, and the scale.
 
     The scale is a power of two, so dividing by it is exact. Squares and cubes of the scaled

@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float, Int
 
 from certeig.kit.arrays import record
 from eigenshape._arrays import label_components
-from eigenshape._vectors import area_vectors, row_dots, scale_to_unit, unit_vectors
+from eigenshape._vectors import area_vectors, row_dots, scale_to_unit, sum_rows, unit_vectors
 from eigenshape.features.contrast import FINE_CONTRAST
 from eigenshape.features.part_merging import tree_of_merges
 from eigenshape.features.region_tree import PartTree
@@ -138,7 +138,7 @@ def _cuts_at_ledges(mesh: TriangleMesh, measures: _Measures) -> Iterator[_Cut]:
     # Patches are bounded by creases. A crease is concave if one face rises above the other.
     smooth = smooth_pairs(mesh)
     n_patches, patches = label_components(mesh.n_faces, *pairs[smooth].T)
-    normals = np.column_stack([np.bincount(patches, column, n_patches) for column in vectors.T])
+    normals = sum_rows(patches, vectors, n_patches)
     patch_areas = np.bincount(patches, areas, n_patches)
     one, two = points[mesh.faces].mean(axis=1)[pairs].transpose(1, 0, 2)
     concave = ~smooth & (row_dots(vectors[pairs[:, 0]], two - one) > 0)

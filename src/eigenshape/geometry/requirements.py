@@ -18,6 +18,7 @@ from eigenshape.geometry.topology import (
     non_manifold_vertices,
     repeated_simplices,
     require_simplices_everywhere,
+    unreferenced_vertices,
     vertex_components,
 )
 
@@ -52,9 +53,8 @@ def require_volumes(mesh: Mesh) -> None:
             f"{plural} must have {measure}; {singular} {flat[0]} is {corners.tolist()} "
             f"with corners {mesh.points[corners].tolist()} ({flat.size} such). {try_auto()}"
         )
-    used = np.zeros(mesh.n_points, dtype=bool)
-    used[mesh.simplices] = True
-    require_span(mesh.points[used], mesh.dim, "The points of a mesh")
+    used = np.delete(mesh.points, unreferenced_vertices(mesh), axis=0)
+    require_span(used, mesh.dim, "The points of a mesh")
 
 
 def require_different_simplices(mesh: Mesh) -> None:

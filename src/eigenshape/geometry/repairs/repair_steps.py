@@ -10,7 +10,7 @@ from certeig.kit.errors import InvalidParameterError
 from eigenshape._arrays import label_components, number_places
 from eigenshape._corners import scaled_corners, side_lengths
 from eigenshape._errors import count_nouns
-from eigenshape._vectors import size_one, triangle_areas
+from eigenshape._vectors import scale_to_unit, size_one, triangle_areas
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair_report import (
@@ -55,8 +55,7 @@ def weld(mesh: MeshT, *, tolerance: float = 0.0) -> RepairedMesh[MeshT]:
     if tolerance == 0:
         group = number_places(mesh.points)
     else:
-        points, _ = size_one(mesh.points)
-        points, _ = size_one(points - points.mean(axis=0))
+        points, _ = scale_to_unit(mesh.points)
         radius = tolerance * float(np.linalg.norm(np.ptp(points, axis=0)))
         near = cKDTree(points).query_pairs(radius, output_type="ndarray")
         _, group = label_components(mesh.n_points, *near.T)
