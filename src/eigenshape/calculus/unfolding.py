@@ -51,7 +51,6 @@ class GeodesicPath(ReadOnly):
 class Sides:
     """What a walk over faces needs; side 3f + s runs from corner s of face f to the next."""
 
-    points: Float[np.ndarray, "n 3"]
     tails: Int[np.ndarray, " h"]
     heads: Int[np.ndarray, " h"]
     twins: Int[np.ndarray, " h"]
@@ -70,7 +69,7 @@ def walkable_sides(mesh: TriangleMesh) -> Sides:
     of_edge = dict(
         zip(zip(tails.tolist(), heads.tolist(), strict=True), range(len(tails)), strict=True)
     )
-    return Sides(mesh.vertices, tails, heads, side_twins(mesh), lengths, angles, around, of_edge)
+    return Sides(tails, heads, side_twins(mesh), lengths, angles, around, of_edge)
 
 
 def flat_corners(corners: Float[np.ndarray, "3 3"]) -> Complex[np.ndarray, "3"]:

@@ -11,7 +11,6 @@ from eigenshape._typing import FileLike
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair import repair
-from eigenshape.geometry.repairs.repair_names import drops_missing
 from eigenshape.geometry.repairs.repair_report import RepairedCloud, RepairedMesh
 from eigenshape.geometry.simplicial import Mesh, SimplicialMesh
 from eigenshape.io.formats.cells import require_kind
@@ -126,8 +125,9 @@ def load_shape(
     with naming(source.path):
         points, simplices = parse_file(source, cells)
         n_cells, n_corners = simplices.shape
+        drop_missing = "auto" in repairs or "drop_missing" in repairs
         points, simplices, kept, left_out = require_finite(
-            points, simplices, drop_missing=drops_missing(repairs)
+            points, simplices, drop_missing=drop_missing
         )
         if not n_cells:
             cloud = repair(PointCloud(points, dim), repairs)

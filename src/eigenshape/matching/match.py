@@ -52,7 +52,7 @@ from eigenshape.matching.target import (
     LEAST_AREA,
     MatchTarget,
     TargetPiece,
-    as_target,
+    prepare_target,
     require_matchable,
 )
 from eigenshape.matching.turns import is_rigid
@@ -202,7 +202,7 @@ def match_shapes(
     if is_partial:
         factor = factor_of_overlap(scale)
     tell(0.0, "prepare the whole")
-    target = as_target(whole)
+    target = whole if isinstance(whole, MatchTarget) else prepare_target(whole)
     # Even a part that is as large as it may be has its large pieces among these.
     split = partial(
         split_pieces, least=LEAST_AREA / MOST_AREA, longest=longest_edge(mesh, target.mesh)

@@ -100,9 +100,9 @@ def log_differences(
 
 def descriptor_costs(differences: Float[np.ndarray, "m k"]) -> Float[np.ndarray, "m k"]:
     """Return differences of patches in units of the median difference to the most similar one."""
-    costs = differences
     # Differences of single precision below this are rounding.
-    return costs / max(float(np.median(costs.min(axis=1))), float(np.finfo(np.float32).eps))
+    unit = max(float(np.median(differences.min(axis=1))), float(np.finfo(np.float32).eps))
+    return differences / unit
 
 
 def first_candidates(costs: Float[np.ndarray, "m k"]) -> tuple[np.ndarray, np.ndarray]:

@@ -106,8 +106,7 @@ def _join_short_edges(mesh: TriangleMesh, length: float) -> TriangleMesh:
     while True:
         edges = edge_table(TriangleMesh(mesh.vertices, faces)).edges
         lengths = np.linalg.norm(np.subtract(*mesh.vertices[edges.T]), axis=1)
-        rank = np.empty(len(edges), dtype=np.int64)
-        rank[np.argsort(lengths, kind="stable")] = np.arange(len(edges))
+        rank = np.argsort(np.argsort(lengths, kind="stable"))
         first = np.full(mesh.n_vertices, len(edges))
         np.minimum.at(first, edges.ravel(), np.repeat(rank, 2))
         joined = (lengths < length) & (first[edges] == rank[:, None]).all(axis=1)

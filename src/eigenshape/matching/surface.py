@@ -71,12 +71,9 @@ class Surface(ReadOnly):
         """Area in square units."""
         return float(self.areas.sum())
 
-    def tree(self) -> RowTree:
-        """Return vertices with their normals, in which all fits to a whole look for the nearest ones."""
-        return self._tree
-
     @cached_property
-    def _tree(self) -> RowTree:
+    def tree(self) -> RowTree:
+        """Vertices with their normals, in which all fits to a whole look for the nearest ones."""
         return RowTree(np.hstack([self.mesh.vertices, NORMAL_LENGTH * self.normals]))
 
 

@@ -167,11 +167,6 @@ def describe_views(mesh: TriangleMesh, points: Int[np.ndarray, " m"]) -> tuple[V
     return tuple(view for view in views if len(view.points))
 
 
-def as_target(whole: MeshLike | MatchTarget) -> MatchTarget:
-    """Return a prepared target as it is, or prepare a mesh."""
-    return whole if isinstance(whole, MatchTarget) else prepare_target(whole)
-
-
 def require_matchable(mesh: TriangleMesh) -> None:
     """Raise an error if a mesh cannot be described by patches."""
     require_describable(mesh)

@@ -21,11 +21,6 @@ CLOUD_REPAIRS = ("auto", "drop_missing", "drop_duplicate_points")
 KNOWN_REPAIRS = tuple(dict.fromkeys((*MESH_REPAIRS, *CLOUD_REPAIRS)))  # of any shape
 
 
-def drops_missing(names: Sequence[str]) -> bool:
-    """Tell whether points that are not finite are to be left out when a file is read."""
-    return "auto" in names or "drop_missing" in names
-
-
 def require_repairs(
     names: Sequence[str], known: Sequence[str] = MESH_REPAIRS, title: str = "Repairs"
 ) -> tuple[str, ...]:
