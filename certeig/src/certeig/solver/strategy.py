@@ -182,7 +182,8 @@ def _solve_sparse(
         below = min(max(n_below, 0), missing)
         wanted = Wanted(below=below, above=missing - below, ceiling=count_shift)
         if n_found == n_certified:
-            # The count has spent the factor, which saves much memory where nothing is missing.
+            # `prove` made the factors of its count in the memory of this one, which saves much where
+            # nothing is missing. So it cannot solve any more, and is made anew.
             factor = factorize_near(pencil, factor.shift)
         _, more = block_lanczos(
             pencil,
