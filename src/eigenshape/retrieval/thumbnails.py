@@ -19,6 +19,7 @@ TURN, TILT = 0.6, 0.4  # radians
 LIGHT = np.array([-0.35, -0.55, 0.76])  # from the upper left, towards the viewer
 DARKEST, BRIGHTEST = 60, 235  # grays of 255; the ground is white
 LEVELS = 40  # grays of a picture: 128 x 128 pixels with them take 2 to 5 KB
+LARGEST_THUMBNAIL = 8192  # bytes, so that a stored shape takes less than 60 KB
 
 
 @one_blas_thread()
@@ -73,7 +74,8 @@ def draw_thumbnail(mesh: MeshLike) -> bytes:
     image = image.reshape(SIZE, FINER, SIZE, FINER).mean(axis=(1, 3))
     for levels in (LEVELS, LEVELS // 4, 2):
         png = _png(np.round(np.round(image / 255 * (levels - 1)) * 255 / (levels - 1)))
-        if len(png) <= 8192:  # noise of a surface that fills the picture may need fewer grays
+        # Noise of a surface that fills the picture may need fewer grays.
+        if len(png) <= LARGEST_THUMBNAIL:
             break
     return png
 

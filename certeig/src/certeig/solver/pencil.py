@@ -325,7 +325,7 @@ def _mass_floor(
     pattern = _shift_pattern(mass, sp.csc_array(sp.diags_array(diagonal)))
     for floor in floors.tolist():
         lower = SymmetricFactor.of_entries(
-            pattern.elimination, pattern.stiffness - floor * pattern.mass
+            pattern.elimination, pattern.stiffness - floor * pattern.mass, pattern.memory
         )
         if lower and (lower.pivots > 0).all():
             return floor

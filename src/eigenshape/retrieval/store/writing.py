@@ -30,6 +30,7 @@ from eigenshape.retrieval.store.state import (
     StoredDescriptor,
     StoredShape,
 )
+from eigenshape.retrieval.thumbnails import LARGEST_THUMBNAIL
 
 
 @dataclass(frozen=True)
@@ -68,9 +69,6 @@ class Record(ShapeFacts):
     """
 
     recipes: tuple[AnyRecipe, ...] = ()
-
-
-LARGEST_THUMBNAIL = 8192  # bytes, so that a shape takes less than 60 KB
 
 
 @record
