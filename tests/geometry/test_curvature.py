@@ -139,6 +139,7 @@ def test_few_neighbors_are_enough_for_principal_curvatures():
     np.testing.assert_allclose(plane, 0.0, atol=1e-12)
 
 
+@pytest.mark.filterwarnings("ignore:Both sides of a seam")
 def test_a_vertex_without_normal_is_named():
     # Two triangles that lie on each other, turned over, so that their normals cancel.
     points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 1, 0], [1, 0, 0]]

@@ -185,6 +185,7 @@ def test_names_and_turns_change_nothing():
     np.testing.assert_allclose(one.upper, two.upper, rtol=1e-9)
 
 
+@pytest.mark.filterwarnings("ignore:All .* eigenvalues are 0")
 @pytest.mark.filterwarnings("ignore:Both sides of a seam")
 def test_values_are_kept_and_explained():
     found = bracket_eigenvalues(grid(8, 8), 5)

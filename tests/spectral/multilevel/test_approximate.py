@@ -180,6 +180,7 @@ def test_up_to_100_000_points_pairs_are_certified(monkeypatch, options):
     assert not solve_roughly(dense, 9, **options | {"max_residual": None}).certificate.complete
 
 
+@pytest.mark.filterwarnings("ignore:All .* eigenvalues are 0")
 def test_few_points_are_solved_and_proved():
     found = solve_roughly(cotangent_laplacian(icosphere(2)), 9)
     assert found.certificate.complete

@@ -106,6 +106,7 @@ def test_spectra_of_two_surfaces_are_refused():
         reflection_free_signature(one, two, [1.0])
 
 
+@pytest.mark.filterwarnings("ignore:All .* eigenvalues are 0")
 def test_default_times_span_what_the_spectrum_tells():
     spectrum = solve_spectrum(cotangent_laplacian(torus(12, 9)), 30)
     times = default_times(spectrum, 20)
