@@ -20,7 +20,7 @@ from eigenshape.plot.figure import Figure
         lambda path: es.write_mesh(es.icosphere(0), path),
         lambda path: es.io.write_edits([], es.icosphere(0), path),
         lambda path: es.io.read_edits(path, es.icosphere(0)),
-        lambda path: es.save_figure(Figure(), path),
+        lambda path: es.save_figure(Figure(1.0, 1.0), path),
         lambda path: es.solve_spectrum(es.cotangent_laplacian(es.icosphere(0)), 2, cache=path),
     ],
 )

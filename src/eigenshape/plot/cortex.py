@@ -3,10 +3,8 @@
 from collections.abc import Mapping
 from itertools import product
 
-import matplotlib as mpl
 import numpy as np
 from jaxtyping import Float
-from matplotlib.cm import ScalarMappable
 
 from certeig.kit.arguments import require_type
 from certeig.kit.errors import InvalidParameterError
@@ -115,10 +113,8 @@ def figure_cortex(
         fields = {side: vertex_field(each, meshes[side]) for side, each in maps.items()}
         numbers = np.concatenate([field.filled(np.nan) for field in fields.values()])
         together = np.ma.masked_invalid(numbers)
-        scale, extend = value_scale(together, limits)
-        colors = mpl.colormaps[color_map].with_extremes(bad=NO_VALUE)
-        shades = {side: map_colors(field, scale, colors) for side, field in fields.items()}
-        bar = ScalarMappable(scale, colors)
+        bar, extend = value_scale(together, limits, color_map)
+        shades = {side: map_colors(field, bar) for side, field in fields.items()}
 
     # Both hemispheres are drawn in one box, so that they have one scale. Of the square drawings,
     # only the height of that box is shown.
@@ -126,8 +122,8 @@ def figure_cortex(
     half = np.max(halves, axis=0)
     _, depth, height = half
     share = 2 * FREE_BORDER + (1 - 2 * FREE_BORDER) * height / max(depth, height)
-    size = (1.4 * PANEL * len(meshes) + (1.0 if bar else 0.2), 2 * (1.4 * PANEL * share + 0.3))
-    figure = Figure(figsize=size, layout="constrained")
+    width = 1.4 * PANEL * len(meshes) + (1.0 if bar else 0.2)
+    figure = Figure(width, 2 * (1.4 * PANEL * share + 0.3))
     grid = figure.subplots(2, len(meshes), squeeze=False)
     for column, (side, mesh) in enumerate(meshes.items()):
         middle = mesh.vertices.min(axis=0) + np.ptp(mesh.vertices, axis=0) / 2
@@ -144,8 +140,8 @@ def figure_cortex(
             grid[row, column].set_ylim(PIXELS * (1 + share) / 2, PIXELS * (1 - share) / 2)
             grid[row, column].set_title(f"{side}, {title}", fontsize=10)
     if bar is not None:
-        drawn = figure.colorbar(bar, ax=grid, shrink=0.6, extend=extend)
-        drawn.set_label(bar_label(label, together))
+        text = bar_label(label, together)
+        figure.colorbar(bar, ax=grid, shrink=0.6, extend=extend, label=text)
     return figure
 
 

@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int, UInt8
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Colormap, Normalize
+from matplotlib.colors import Normalize
 
 from certeig.kit.arguments import require_type
 from certeig.kit.arrays import finite_values, real_numbers, whole_numbers
@@ -94,18 +94,18 @@ def figure_eigenfunctions(
         raise InvalidParameterError("indices must name at least one eigenfunction; it is empty.")
     camera = choose_camera(mesh, camera, view, up, size=420)
     figure, grid = empty_grid(len(chosen), min(len(chosen), 4))
-    colors, scale = mpl.colormaps["RdBu_r"], Normalize(-1, 1)
+    scale = ScalarMappable(Normalize(-1, 1), "RdBu_r")
     for axes, index in zip(grid.flat, chosen, strict=False):
         function = spectrum.eigenvectors[:, index]
         shown = function / np.abs(function).max()
         # A constant function is zero nowhere, whatever its rounding.
         zero_set_of = shown if np.ptp(shown) > 1e-6 else np.ones_like(shown)
-        shades = map_colors(shown, scale, colors)
+        shades = map_colors(shown, scale)
         show(axes, draw(mesh, camera, vertex_colors=shades, zero_set_of=zero_set_of))
         number = spectrum.certificate.first + index
         axes.set_title(f"φ$_{{{number}}}$,  λ = {spectrum.eigenvalues[index]:.4g}")
-    bar = figure.colorbar(ScalarMappable(scale, colors), ax=grid, shrink=0.7)
-    bar.set_label("eigenfunction / its largest value (dark line: 0)")
+    label = "eigenfunction / its largest value (dark line: 0)"
+    figure.colorbar(scale, ax=grid, shrink=0.7, label=label)
     return figure
 
 
@@ -168,15 +168,14 @@ def figure_field(  # noqa: PLR0913 - what is drawn, and one keyword for each cho
     'height, length'
     """
     mesh = as_mesh(mesh)
-    figure = Figure(figsize=(2 * PANEL + 1.2, 2 * PANEL), layout="constrained")
+    figure = Figure(2 * PANEL + 1.2, 2 * PANEL)
     axes = figure.subplots()
     field = vertex_field(values, mesh)
-    scale, extend = value_scale(field, limits)
-    colors = mpl.colormaps[color_map].with_extremes(bad=NO_VALUE)
+    scale, extend = value_scale(field, limits, color_map)
     camera = choose_camera(mesh, camera, view, up)
-    show(axes, draw(mesh, camera, vertex_colors=map_colors(field, scale, colors)))
-    bar = figure.colorbar(ScalarMappable(scale, colors), ax=axes, shrink=0.8, extend=extend)
-    bar.set_label(bar_label(label, field))
+    show(axes, draw(mesh, camera, vertex_colors=map_colors(field, scale)))
+    text = bar_label(label, field)
+    figure.colorbar(scale, ax=axes, shrink=0.8, extend=extend, label=text)
     return figure
 
 
@@ -245,23 +244,22 @@ def figure_fields(  # noqa: PLR0913 - what is drawn, and one keyword for each ch
         mesh = as_mesh(pair[0], title)
         shapes[title] = (mesh, vertex_field(pair[1], mesh))
     everything = np.ma.concatenate([field for _, field in shapes.values()])
-    scale, extend = value_scale(everything, limits)
-    colors = mpl.colormaps[color_map].with_extremes(bad=NO_VALUE)
+    scale, extend = value_scale(everything, limits, color_map)
     n_columns = 2 if len(shapes) == 4 else min(len(shapes), 3)
     figure, grid = empty_grid(len(shapes), n_columns)
     for axes, (title, (mesh, field)) in zip(grid.flat, shapes.items(), strict=False):
         aimed = choose_camera(mesh, camera, view, up, size=420)
-        show(axes, draw(mesh, aimed, vertex_colors=map_colors(field, scale, colors)))
+        show(axes, draw(mesh, aimed, vertex_colors=map_colors(field, scale)))
         axes.set_title(title)
-    bar = figure.colorbar(ScalarMappable(scale, colors), ax=grid, shrink=0.7, extend=extend)
-    bar.set_label(bar_label(label, everything))
+    text = bar_label(label, everything)
+    figure.colorbar(scale, ax=grid, shrink=0.7, extend=extend, label=text)
     return figure
 
 
 def empty_grid(n_drawings: int, n_columns: int, size: float = PANEL) -> tuple[Figure, np.ndarray]:
     """Return a figure with room for a color bar, and its axes, without frames: some rows of drawings."""
     n_rows = -(-n_drawings // n_columns)
-    figure = Figure(figsize=(size * n_columns + 0.8, (size + 0.3) * n_rows), layout="constrained")
+    figure = Figure(size * n_columns + 0.8, (size + 0.3) * n_rows)
     grid = figure.subplots(n_rows, n_columns, squeeze=False)
     for axes in grid.flat:
         axes.set_axis_off()
@@ -270,7 +268,7 @@ def empty_grid(n_drawings: int, n_columns: int, size: float = PANEL) -> tuple[Fi
 
 def two_panels() -> tuple[Figure, Axes, Axes]:
     """Return a figure of two large drawings side by side, and its axes."""
-    figure = Figure(figsize=(4.4 * PANEL, 2.2 * PANEL + 0.4), layout="constrained")
+    figure = Figure(4.4 * PANEL, 2.2 * PANEL + 0.4)
     left, right = figure.subplots(1, 2)
     return figure, left, right
 
@@ -293,8 +291,8 @@ def vertex_field(values: ArrayLike, mesh: TriangleMesh) -> np.ma.MaskedArray:
 
 
 def value_scale(
-    field: np.ma.MaskedArray, limits: tuple[float, float] | None
-) -> tuple[Normalize, str]:
+    field: np.ma.MaskedArray, limits: tuple[float, float] | None, color_map: str
+) -> tuple[ScalarMappable, str]:
     """Return the scale of the colors of a field, and at which ends it has values beyond that.
 
     Raise InvalidParameterError if there is no value, or `limits` are not two ascending numbers.
@@ -310,7 +308,8 @@ def value_scale(
         )
     below, above = bool((known < ends[0]).any()), bool((known > ends[1]).any())
     extend = {(1, 1): "both", (1, 0): "min", (0, 1): "max", (0, 0): "neither"}[below, above]
-    return Normalize(*ends), extend
+    colors = mpl.colormaps[color_map].with_extremes(bad=NO_VALUE)
+    return ScalarMappable(Normalize(*ends), colors), extend
 
 
 def bar_label(label: str, field: np.ma.MaskedArray) -> str:
@@ -318,11 +317,9 @@ def bar_label(label: str, field: np.ma.MaskedArray) -> str:
     return f"{label} (gray: no value)".strip() if np.ma.is_masked(field) else label
 
 
-def map_colors(
-    values: Float[np.ndarray, " n"], scale: Normalize, colors: Colormap
-) -> Float[np.ndarray, "n 3"]:
+def map_colors(values: Float[np.ndarray, " n"], scale: ScalarMappable) -> Float[np.ndarray, "n 3"]:
     """Return the color of each value."""
-    return np.asarray(colors(scale(values)))[:, :3]
+    return scale.to_rgba(values)[:, :3]
 
 
 def figure_segments(
@@ -382,7 +379,7 @@ def figure_segments(
     marked = np.empty(0, dtype=np.int64)
     if vertices is not None:
         marked = whole_numbers(vertices, "A feature point", 0, mesh.n_vertices - 1)
-    figure = Figure(figsize=(2 * PANEL, 2 * PANEL + 0.4), layout="constrained")
+    figure = Figure(2 * PANEL, 2 * PANEL + 0.4)
     axes = figure.subplots()
     drawing = draw(mesh, choose_camera(mesh, camera, view, up), face_colors=palette(labels))
     show(axes, drawing)
@@ -473,7 +470,7 @@ def value_colors(values: ArrayLike, color_map: str = "viridis") -> UInt8[np.ndar
     """
     field = finite_values(values, "values")
     scale = Normalize(float(field.min()), float(field.max()))
-    return _bytes(map_colors(field, scale, mpl.colormaps[color_map]))
+    return _bytes(map_colors(field, ScalarMappable(scale, mpl.colormaps[color_map])))
 
 
 def _bytes(colors: Float[np.ndarray, "n 3"]) -> UInt8[np.ndarray, "n 3"]:

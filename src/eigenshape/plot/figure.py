@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from matplotlib import figure as matplotlib_figure
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
 
@@ -22,6 +23,9 @@ class Figure(matplotlib_figure.Figure):
     matplotlib itself shows a figure in a notebook only if `pyplot` made it.
     """
 
+    def __init__(self, width: float, height: float) -> None:
+        super().__init__(figsize=(width, height), layout="constrained")
+
     def _repr_png_(self) -> bytes:
         """Return the picture that IPython shows for this figure."""
         file = BytesIO()
@@ -35,6 +39,11 @@ class Figure(matplotlib_figure.Figure):
             if plain != text.get_text():
                 text.set_text(plain)
         super().draw(renderer)
+
+
+def open_frame(axes: Axes) -> None:
+    """Draw the lines of a frame at the left and below only."""
+    axes.spines[["top", "right"]].set_visible(False)
 
 
 def require_picture_path(path: str | Path) -> Path:

@@ -11,7 +11,7 @@ from certeig.kit.errors import InvalidParameterError
 from certeig.kit.text import literal
 from certeig.kit.typing import ArrayLike
 from eigenshape._arrays import finite_rows
-from eigenshape.plot.figure import Figure
+from eigenshape.plot.figure import Figure, open_frame
 from eigenshape.plot.render import palette
 
 
@@ -66,7 +66,7 @@ def figure_ordination(
             f"scores must have two columns or more, and groups and names one entry for each row; "
             f"there are {points.shape} scores, {labels.size} groups and {len(names)} names."
         )
-    figure = Figure(figsize=(6.6, 6.0), layout="constrained")
+    figure = Figure(6.6, 6.0)
     axes = figure.subplots()
     kinds = np.unique(labels)
     for kind, color in zip(kinds, palette(np.arange(len(kinds))), strict=True):
@@ -86,7 +86,7 @@ def figure_ordination(
         percents = [f" ({100 * share:.0f} %)" for share in finite_values(shares, "shares")[:2]]
     axes.set(xlabel=f"component 1{percents[0]}", ylabel=f"component 2{percents[-1]}")
     axes.set_aspect("equal", adjustable="datalim")
-    axes.spines[["top", "right"]].set_visible(False)
+    open_frame(axes)
     if groups is not None:
         axes.legend(frameon=False, fontsize=8)
     return figure
@@ -141,7 +141,7 @@ def figure_landmarks(shapes: ArrayLike, *, names: Sequence[str] = ()) -> Figure:
     # The longest axis of the mean lies across, in both panels.
     turn = np.linalg.svd(mean - middle)[2].T
     points, mean = (points - middle) @ turn, (mean - middle) @ turn
-    figure = Figure(figsize=(11.0, 5.6), layout="constrained")
+    figure = Figure(11.0, 5.6)
     for axes, height in zip(figure.subplots(1, 2), (1, 2), strict=True):
         axes.scatter(points[..., 0], points[..., height], s=4, color="0.65")
         axes.scatter(mean[:, 0], mean[:, height], s=22, color="#d62728")
@@ -149,5 +149,5 @@ def figure_landmarks(shapes: ArrayLike, *, names: Sequence[str] = ()) -> Figure:
             axes.annotate(literal(text), place, (3, 3), textcoords="offset points", fontsize=7)
         axes.set(xlabel="axis 1", ylabel=f"axis {height + 1}")
         axes.set_aspect("equal", adjustable="datalim")
-        axes.spines[["top", "right"]].set_visible(False)
+        open_frame(axes)
     return figure

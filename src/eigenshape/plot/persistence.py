@@ -9,7 +9,7 @@ from certeig.kit.arrays import TINY, number_from_zero, whole_number
 from eigenshape.features.diagram import PersistenceDiagram, PersistencePairs
 from eigenshape.features.region_tree import MergeTree, PartTree
 from eigenshape.features.segmentation import merge_targets
-from eigenshape.plot.figure import Figure
+from eigenshape.plot.figure import Figure, open_frame
 from eigenshape.plot.render import palette
 
 KINDS = {  # color, marker and text of each kind of pair
@@ -51,7 +51,7 @@ def figure_diagram(diagram: PersistenceDiagram, *, label: str = "function") -> F
     'birth: height'
     """
     require_type(diagram, PersistenceDiagram, "diagram")
-    figure = Figure(figsize=(6.6, 6.0), layout="constrained")
+    figure = Figure(6.6, 6.0)
     axes = figure.subplots()
     for kind, (color, marker, text) in KINDS.items():
         pairs: PersistencePairs | None = getattr(diagram, kind)
@@ -70,7 +70,7 @@ def figure_diagram(diagram: PersistenceDiagram, *, label: str = "function") -> F
     axes.set_xlabel(f"birth: {label}")
     axes.set_ylabel(f"death: {label}")
     axes.legend(frameon=False, fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
-    axes.spines[["top", "right"]].set_visible(False)
+    open_frame(axes)
     return figure
 
 
@@ -121,7 +121,7 @@ def figure_merge_tree(
     wanted = 0.0 if persistence is None else number_from_zero(persistence, "persistence")
     cut = wanted if np.isfinite(wanted) else 0.0
     top = HEADROOM * max(float(finite.max(initial=0.0)), cut) or 1.0
-    figure = Figure(figsize=(max(4.5, 2.2 + 0.24 * shown), 4.6), layout="constrained")
+    figure = Figure(max(4.5, 2.2 + 0.24 * shown), 4.6)
     axes = figure.subplots()
     place = leaf_places(into)
     height = np.minimum(tree.persistence[:shown], top)
@@ -146,7 +146,7 @@ def figure_merge_tree(
         axes.set_title(
             f"cut at {persistence:.4g}: {n_left:,} region{'s' * (n_left != 1)} left", fontsize=10
         )
-    axes.spines[["top", "right"]].set_visible(False)
+    open_frame(axes)
     return figure
 
 

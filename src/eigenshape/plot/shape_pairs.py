@@ -1,6 +1,5 @@
 """Pictures of two shapes: a map between them, and a report on how near they are."""
 
-import matplotlib as mpl
 import numpy as np
 from jaxtyping import Float
 from matplotlib.axes import Axes
@@ -18,7 +17,7 @@ from eigenshape.geometry.simplices import dual_volumes
 from eigenshape.matching.shape_match import ShapeMatch
 from eigenshape.plot.camera import Camera, Up, View, aim_camera
 from eigenshape.plot.fields import PANEL, map_colors, show, two_panels
-from eigenshape.plot.figure import Figure
+from eigenshape.plot.figure import Figure, open_frame
 from eigenshape.plot.render import draw
 from eigenshape.plot.spectra import draw_comparison
 from eigenshape.stability.report import StabilityReport
@@ -167,26 +166,26 @@ def figure_stability(
     one = as_shape(one, "one")
     two = as_shape(two, "two")
     drawn = isinstance(one, TriangleMesh) and isinstance(two, TriangleMesh)
-    figure = Figure(figsize=(11, 11.5 if drawn else 8), layout="constrained")
+    figure = Figure(11, 11.5 if drawn else 8)
     rows = figure.subfigures(
         2 if drawn else 1, 1, squeeze=False, height_ratios=[PANEL, 8] if drawn else None
     )[:, 0]
     if isinstance(one, TriangleMesh) and isinstance(two, TriangleMesh):
         camera = aim_camera(one, view=view, up=up)
         panels = rows[0].subplots(1, 2)
-        scale, colors = Normalize(0.0, report.distance or 1.0), mpl.colormaps["viridis"]
+        scale = ScalarMappable(Normalize(0.0, report.distance or 1.0), "viridis")
         shown = zip(panels, (one, two), report.distances, titles, strict=True)
         for axes, mesh, values, title in shown:
-            show(axes, draw(mesh, camera, vertex_colors=map_colors(values, scale, colors)))
+            show(axes, draw(mesh, camera, vertex_colors=map_colors(values, scale)))
             axes.set_title(title)
-        bar = rows[0].colorbar(ScalarMappable(scale, colors), ax=panels.tolist(), shrink=0.8)
-        bar.set_label("distance from the other shape, length")
+        label = "distance from the other shape, length"
+        rows[0].colorbar(scale, ax=panels.tolist(), shrink=0.8, label=label)
     grid = rows[-1].subplots(2, 2)
     draw_comparison(grid[:, 0], report.spectra, titles)
     _draw_times(grid[0, 1], report)
     _draw_angles(grid[1, 1], report)
     for axes in grid.flat:
-        axes.spines[["top", "right"]].set_visible(False)
+        open_frame(axes)
     return figure
 
 

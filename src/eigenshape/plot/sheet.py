@@ -17,7 +17,7 @@ from eigenshape._arrays import vertex_values
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.plot.camera import Camera, Up, View, aim_camera, choose_camera
-from eigenshape.plot.fields import PANEL, empty_grid, mark, show, two_panels
+from eigenshape.plot.fields import PANEL, empty_grid, map_colors, mark, show, two_panels
 from eigenshape.plot.figure import Figure
 from eigenshape.plot.render import draw, palette
 from eigenshape.retrieval.labels.labeled_shape import LabeledShape
@@ -119,7 +119,7 @@ def figure_contact_sheet(
     n_columns = min(max(len(matches), 1), MATCHES_IN_A_ROW)
     n_rows = max(-(-len(matches) // n_columns), 1)
     size = PANEL * (1.0 if n_rows > 1 else 0.9)
-    figure = Figure(figsize=(size * (n_columns + 1.5), size * n_rows + 0.8), layout="constrained")
+    figure = Figure(size * (n_columns + 1.5), size * n_rows + 0.8)
     left, right = figure.subfigures(1, 2, squeeze=False, width_ratios=[1.5, n_columns])[0]
     left.set_facecolor("#f3f3f3")
     _fill(left.subplots(), query, view, up)
@@ -282,17 +282,15 @@ def figure_poses(
     sides = zip(seen.min(axis=0), seen.max(axis=0), strict=True)
     corners = np.array(list(product(*sides))) @ camera.rotation
     # a new map for each call, because a map fills its table at first use and threads may share it
-    colormap = LinearSegmentedColormap.from_list("moved", MOVED)
+    scale = ScalarMappable(Normalize(0, 1), LinearSegmentedColormap.from_list("moved", MOVED))
     for axes, (title, mesh) in zip(grid.flat, meshes.items(), strict=False):
         n = mesh.n_vertices
         values = np.zeros(n) if shares is None else vertex_values(shares, "shares", n)
-        colors = np.asarray(colormap(np.append(values, np.zeros(len(corners)))))[:, :3]
+        colors = map_colors(np.append(values, np.zeros(len(corners))), scale)
         framed = TriangleMesh(np.vstack([mesh.vertices, corners]), mesh.faces)
         show(axes, draw(framed, camera, vertex_colors=colors))
         axes.set_title(title)
     if shares is not None:
-        scale = ScalarMappable(Normalize(0, 1), colormap)
-        figure.colorbar(scale, ax=grid.ravel().tolist(), shrink=0.6, pad=0.01).set_label(
-            "share of the motion"
-        )
+        label = "share of the motion"
+        figure.colorbar(scale, ax=grid.ravel().tolist(), shrink=0.6, pad=0.01, label=label)
     return figure

@@ -9,7 +9,7 @@ from certeig.kit.arguments import require_type
 from certeig.kit.arrays import positive_number
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike
-from eigenshape.plot.figure import Figure
+from eigenshape.plot.figure import Figure, open_frame
 from eigenshape.plot.render import palette
 from eigenshape.spectral.bounds.brackets import Brackets
 from eigenshape.spectral.comparison.eigenvalues import (
@@ -63,7 +63,7 @@ def figure_spectrum(
     """
     require_type(spectrum, Spectrum, "spectrum")
     require_type(brackets, Brackets | None, "brackets")
-    figure = Figure(figsize=(7.5, 4.6), layout="constrained")
+    figure = Figure(7.5, 4.6)
     axes = figure.subplots()
     proof = spectrum.certificate
     number = proof.first + np.arange(len(spectrum.eigenvalues))
@@ -84,7 +84,7 @@ def figure_spectrum(
     axes.set_ylabel("eigenvalue λ, 1/length²")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.legend(frameon=False, loc="lower right")
-    axes.spines[["top", "right"]].set_visible(False)
+    open_frame(axes)
     return figure
 
 
@@ -139,7 +139,7 @@ def figure_spectra(
     rows = _rows(spectra, titles, brackets or {})
     if len(rows) < 2:
         raise InvalidParameterError(f"spectra must hold two or more spectra; it holds {len(rows)}.")
-    figure = Figure(figsize=(7.5, 6.4), layout="constrained")
+    figure = Figure(7.5, 6.4)
     _draw_rows(figure.subplots(2, 1, sharex=True, height_ratios=(3, 2)), rows, unit)
     return figure
 
@@ -184,7 +184,7 @@ def _draw_rows(panels: np.ndarray, rows: list[Row], unit: str) -> None:
     below.set_xlabel("number i")
     for axes in (above, below):
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-        axes.spines[["top", "right"]].set_visible(False)
+        open_frame(axes)
 
 
 def _rows(
