@@ -36,7 +36,7 @@ def scale_to_unit(points: Float[np.ndarray, "n d"]) -> tuple[Float[np.ndarray, "
     return points, scale * inner_scale
 
 
-def unit_vectors(vectors: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "k 3"]:
+def unit_vectors(vectors: Float[np.ndarray, "k d"]) -> Float[np.ndarray, "k d"]:
     """Give vectors the length 1, and make zeros of those without one."""
     norms = np.linalg.norm(vectors, axis=1, keepdims=True)
     return np.divide(vectors, norms, out=np.zeros_like(vectors), where=norms > 0)

@@ -12,7 +12,7 @@ from certeig.kit.typing import ArrayLike, Integer
 from eigenshape._arrays import require_finite_rows, step_number
 from eigenshape._corners import at_points, scaled_corners, side_lengths, triangular_sides
 from eigenshape._errors import InvalidShapeError
-from eigenshape._vectors import row_dots, scale_to_unit, size_one, triangle_areas
+from eigenshape._vectors import row_dots, scale_to_unit, size_one, triangle_areas, unit_vectors
 from eigenshape.calculus.linear_solver import LinearSolver, factor_definite
 from eigenshape.calculus.vector_heat import as_rows
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -310,7 +310,7 @@ def _relax_around(
     inner = sp.eye_array(len(free)) - means[free][:, free]
     moved = spsolve(inner.tocsc(), means[free][:, fixed] @ sphere[fixed])
     relaxed = sphere.copy()
-    relaxed[free] = moved / np.linalg.norm(moved, axis=1)[:, None]
+    relaxed[free] = unit_vectors(moved)
     return relaxed
 
 

@@ -7,7 +7,7 @@ from jaxtyping import Float, Int
 from certeig.kit.arrays import ReadOnly, record
 from eigenshape._corners import face_angles, in_length
 from eigenshape._errors import InvalidShapeError
-from eigenshape._vectors import row_dots, scale_to_unit
+from eigenshape._vectors import row_dots, scale_to_unit, unit_vectors
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import vertex_normals
 from eigenshape.geometry.mesh import TriangleMesh
@@ -177,8 +177,7 @@ def principal_curvatures(mesh: MeshLike) -> PrincipalCurvatures:
         )
     points, scale = scale_to_unit(mesh.vertices)
     # Frames whose first axis is any unit vector orthogonal to the normal
-    first = np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)])
-    first = first / np.linalg.norm(first, axis=1, keepdims=True)
+    first = unit_vectors(np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)]))
     frames = np.stack([first, np.cross(normals, first), normals], axis=1)
     links = neighbor_links(mesh) + sp.eye_array(mesh.n_vertices, format="csr")
     values = np.empty((mesh.n_vertices, 2))

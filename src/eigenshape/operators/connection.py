@@ -6,7 +6,7 @@ from jaxtyping import Complex, Float
 
 from eigenshape._corners import edge_keys, side_ends
 from eigenshape._errors import InvalidShapeError
-from eigenshape._vectors import row_dots, size_one
+from eigenshape._vectors import row_dots, size_one, unit_vectors
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_areas, vertex_normals
@@ -147,8 +147,7 @@ def tangent_frames(mesh: MeshLike | PointCloud) -> Float[np.ndarray, "n 2 3"]:
     if isinstance(mesh, PointCloud):
         normals = cloud_normals(mesh)
         axes = np.eye(3)[np.abs(normals).argmin(axis=1)]
-        first = axes - row_dots(axes, normals)[:, None] * normals
-        first /= np.linalg.norm(first, axis=1, keepdims=True)
+        first = unit_vectors(axes - row_dots(axes, normals)[:, None] * normals)
         return np.stack([first, np.cross(normals, first)], axis=1)
     mesh = as_mesh(mesh)
     sides = vertex_directions(mesh)

@@ -9,6 +9,7 @@ from certeig.kit.arrays import freeze, whole_number
 from certeig.kit.typing import ArrayLike, Integer
 from eigenshape._arrays import finite_rows
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import unit_vectors
 
 # Degrees up to 316. Beyond degree 1400 the functions divided by (1 - z²)^{m/2} overflow.
 MOST_HARMONICS = 10**5
@@ -67,7 +68,7 @@ def sphere_harmonics(points: ArrayLike, k: Integer) -> Float[np.ndarray, "n k"]:
         )
     # Scale each point to size 1 first: squares of tiny or huge coordinates underflow or overflow.
     rows = np.ldexp(rows, -np.frexp(sizes)[1][:, None])
-    x, y, z = (rows / np.linalg.norm(rows, axis=1, keepdims=True)).T
+    x, y, z = unit_vectors(rows).T
     last = isqrt(count - 1)
     harmonics = np.empty((len(rows), (last + 1) ** 2))
     turn = x + 1j * y

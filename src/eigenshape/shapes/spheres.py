@@ -10,6 +10,7 @@ from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike, Integer
 from eigenshape._arrays import finite_rows
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import unit_vectors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.shapes.surfaces import icosphere
@@ -85,7 +86,7 @@ def random_sphere(n: Integer = 1000, *, rng: np.random.Generator) -> TriangleMes
     require_type(rng, np.random.Generator, "rng")
     count = whole_number(n, "n", 20, MOST_POINTS)
     directions = rng.standard_normal((count, 3))
-    return _outward_hull(directions / np.linalg.norm(directions, axis=1, keepdims=True))
+    return _outward_hull(unit_vectors(directions))
 
 
 def uneven_sphere(n: Integer = 1000, *, ratio: float = 4.0) -> TriangleMesh:

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Int
 
 from certeig.kit.arrays import positive_values, whole_number
+from eigenshape._vectors import unit_vectors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.resolution.subdivision import subdivide
 
@@ -43,9 +44,7 @@ def icosphere(level: int = 3) -> TriangleMesh:
     mesh = _icosahedron()
     for _ in range(level):
         mesh = subdivide(mesh)
-        mesh = TriangleMesh(
-            mesh.vertices / np.linalg.norm(mesh.vertices, axis=1, keepdims=True), mesh.faces
-        )
+        mesh = TriangleMesh(unit_vectors(mesh.vertices), mesh.faces)
     return mesh
 
 

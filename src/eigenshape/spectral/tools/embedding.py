@@ -18,6 +18,7 @@ from certeig.kit.errors import InvalidParameterError
 from certeig.kit.memory import require_memory
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike
+from eigenshape._vectors import unit_vectors
 from eigenshape.spectral.diffusion.decay import exponential_decay
 from eigenshape.spectral.requirements import require_lowest
 from eigenshape.spectral.spectrum import Spectrum
@@ -247,7 +248,7 @@ def component_labels(spectrum: Spectrum) -> Int[np.ndarray, " n"]:
     labels = np.zeros(len(rows), dtype=np.int64)
     if rows.shape[1] < 2:
         return labels
-    rows = rows / np.linalg.norm(rows, axis=1)[:, None]
+    rows = unit_vectors(rows)
     labels[:] = -1
     for number in range(rows.shape[1]):
         left = np.flatnonzero(labels < 0)

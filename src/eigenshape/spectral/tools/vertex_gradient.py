@@ -6,7 +6,7 @@ from jaxtyping import Float, Int
 
 from certeig.kit.arrays import TINY
 from eigenshape._corners import mean_normals
-from eigenshape._vectors import row_dots, size_one
+from eigenshape._vectors import row_dots, size_one, unit_vectors
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.operators.clouds.neighbors import nearest_others
@@ -58,8 +58,7 @@ def point_frames(shape: Shape3, edges: Int[np.ndarray, "2 e"]) -> Float[np.ndarr
         normals[without] = np.linalg.eigh(covariances)[1][:, :, 0]
     steep = np.abs(normals[:, :1]) >= STEEP
     axis = np.where(steep, [0.0, 1.0, 0.0], [1.0, 0.0, 0.0])
-    first = axis - (axis * normals).sum(axis=1, keepdims=True) * normals
-    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    first = unit_vectors(axis - (axis * normals).sum(axis=1, keepdims=True) * normals)
     return np.stack([first, np.cross(normals, first), normals], axis=1)
 
 
