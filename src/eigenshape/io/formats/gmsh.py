@@ -191,7 +191,7 @@ def _blocks(
     found = 0
     for _ in range(n_blocks):
         head = section.wholes("<i4", 3).tolist()
-        height = int(section.wholes(size, 1)[0])
+        height = section.one(size)
         found += height
         yield head, height
     section.require_end()

@@ -87,8 +87,8 @@ def _parse_text(data: bytes) -> Found:
             "A Medit file must be whole; it has no End, and no tetrahedra, after which nothing is "
             "missed."
         )
-    version = _single(single, "MeshVersionFormatted", (0, 4))
-    dimension = _single(single, "Dimension", (1, 3))
+    version = _single(single, "MeshVersionFormatted", 0, 4)
+    dimension = _single(single, "Dimension", 1, 3)
     if "Vertices" not in single:
         raise FileFormatError("A Medit file must have Vertices; it has none.")
     points = _rows(single["Vertices"], dimension + 1, "Vertices")[:, :dimension]
@@ -105,9 +105,8 @@ def _numbers(words: list[bytes], name: str) -> Float[np.ndarray, " k"]:
         raise FileFormatError(f"{name} of a Medit file must be numbers; {err}.") from err
 
 
-def _single(found: dict[str, np.ndarray], name: str, limits: tuple[int, int]) -> int:
+def _single(found: dict[str, np.ndarray], name: str, least: int, most: int) -> int:
     numbers = found.get(name, np.empty(0))
-    least, most = limits
     if len(numbers) != 1 or numbers[0] not in range(least, most + 1):
         raise FileFormatError(
             f"A Medit file must have one {name} of {least} to {most}; "
@@ -139,7 +138,7 @@ def _parse_binary(data: bytes) -> Found:
     """Read a file of version 1 to 4, of either byte order."""
     order = {1: "<", 2**24: ">"}.get(int.from_bytes(data[:4], "little"), "")
     cursor = Cursor(data, "A binary Medit file", place=4)
-    version = int(cursor.take(order + "i4", 1)[0]) if order else 0
+    version = cursor.one(order + "i4") if order else 0
     if not 1 <= version <= 4:
         raise FileFormatError(
             f"A binary Medit file must begin with 1 and a version of 1 to 4; it has {data[:8]!r}."
@@ -149,22 +148,22 @@ def _parse_binary(data: bytes) -> Found:
     real = order + ("f4" if version == 1 else "f8")
     dimension, points = 0, np.empty((0, 0))
     tables: dict[str, list[np.ndarray]] = {}
-    while (code := int(cursor.take(order + "i4", 1)[0])) != END:
-        following = int(cursor.take(position, 1)[0])
+    while (code := cursor.one(order + "i4")) != END:
+        following = cursor.one(position)
         if code == DIMENSION:
-            dimension = int(cursor.take(order + "i4", 1)[0])
+            dimension = cursor.one(order + "i4")
             if dimension not in (2, 3):
                 raise FileFormatError(
                     f"Dimension of a Medit file must be 2 or 3; it is {dimension}."
                 )
         elif code == VERTICES:
             row = np.dtype([("point", real, (dimension,)), ("label", whole)])
-            count = int(cursor.take(whole, 1)[0])
+            count = cursor.one(whole)
             points = cursor.take(row, count)["point"].astype(np.float64)
         elif code in CODES:
             name = CODES[code]
             width = N_CORNERS[CELLS[name]] + 1
-            count = int(cursor.take(whole, 1)[0])
+            count = cursor.one(whole)
             rows = cursor.take(whole, count * width).reshape(count, width)
             tables.setdefault(name, []).append(rows)
         else:

@@ -208,6 +208,10 @@ class Cursor:
             return wholes(found, f"Counts and corners of {self.what[0].lower()}{self.what[1:]}")
         return found.astype(np.int64)
 
+    def one(self, kind: Any) -> int:
+        """Return the next number, which must be whole, such as a count."""
+        return int(self.wholes(kind, 1)[0])
+
     def _take_words(self, kind: Any, count: int) -> np.ndarray:
         # A window is split that grows until it holds all words, so that many short lists in a long
         # file cost no more than one long list.

@@ -36,8 +36,8 @@ KINDS = {
     b"unsigned_char": ">u1", b"short": ">i2", b"unsigned_short": ">u2", b"int": ">i4",
     b"unsigned_int": ">u4", b"long": ">i8", b"unsigned_long": ">u8",
     b"vtkidtype": ">i4",  # which VTK writes as an int, whatever its size in memory
-    **{f"vtktypeint{8 * size}".encode(): f">i{size}" for size in (1, 2, 4, 8)},
-    **{f"vtktypeuint{8 * size}".encode(): f">u{size}" for size in (1, 2, 4, 8)},
+    **{f"vtktype{kind}{8 * size}".encode(): f">{kind[0]}{size}"
+       for kind in ("int", "uint") for size in (1, 2, 4, 8)},
 }  # fmt: skip
 TEXTS = (b"string", b"utf8_string", b"variant")
 OF_SURFACES = {
@@ -221,9 +221,9 @@ def _skip_texts(cursor: Cursor, count: int, *, is_packed: bool) -> None:
     """
     for _ in range(count):
         if is_packed:
-            size = 8 >> (int(cursor.take(">u1", 1)[0]) >> 6)
+            size = 8 >> (cursor.one(">u1") >> 6)
             cursor.place -= 1
-            length = int(cursor.take(f">u{size}", 1)[0]) & (2 ** (8 * size - 2) - 1)
+            length = cursor.one(f">u{size}") & (2 ** (8 * size - 2) - 1)
             cursor.take(">u1", length)
         else:
             end = cursor.data.find(b"\n", cursor.place)

@@ -28,7 +28,7 @@ def parse_parcels(data: bytes, mesh: TriangleMesh) -> tuple[Any, ...]:
     cursor = Cursor(data, WHAT)
 
     def take_whole() -> int:
-        return int(cursor.wholes(">i4", 1)[0])
+        return cursor.one(">i4")
 
     def take_text() -> str:
         size = take_whole()

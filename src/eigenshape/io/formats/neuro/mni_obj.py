@@ -26,7 +26,7 @@ def parse(data: bytes) -> tuple[Any, ...]:
     real, whole = f"{order}f4", f"{order}i4"
     cursor = Cursor(data, "An MNI object", is_text=is_text, place=1)
     cursor.take(real, 5)  # how the surface shines
-    n_points = int(cursor.wholes(whole, 1)[0])
+    n_points = cursor.one(whole)
     points = cursor.take(real, 3 * n_points).astype(np.float64)
     cursor.take(real, 3 * n_points)  # normals
     n_polygons, coloring = cursor.wholes(whole, 2).tolist()
