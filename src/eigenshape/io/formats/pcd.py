@@ -43,8 +43,8 @@ class Header:
 
 def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], np.ndarray, *tuple[str, ...]]:
     """Read x, y and z; other fields are named. Missing returns remain NaN, as in the file."""
-    lines, kind, body = _split(data)
-    header = _header(lines)
+    rows, kind, body = _split(data)
+    header = _header(rows)
     n_points, record = header.n_points, header.record
     notes = (
         [f"the fields {b', '.join(header.others).decode('latin-1')} are not read"]
@@ -64,7 +64,7 @@ def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], np.ndarray, *tuple[str
                 f"Compressed points must begin with two sizes; the file ends after {len(body)} bytes."
             )
         packed, size = struct.unpack_from("<II", body)
-        needed = header.n_points * header.record.itemsize
+        needed = n_points * record.itemsize
         if len(body) - 8 < packed or size > MOST_TIMES * packed or size < needed:
             raise FileFormatError(
                 f"Compressed points must have the size they declare; {packed} bytes that unpack to {size} are "
@@ -87,14 +87,13 @@ def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], np.ndarray, *tuple[str
 
 def n_rows(data: bytes) -> int:
     """Return the rows of a depth scan, or 1 for points without an order."""
-    lines, _, _ = _split(data)
-    words = {text.split()[0]: (number, text) for number, text in lines}
-    if b"HEIGHT" not in words or b"WIDTH" not in words:
+    rows, _, _ = _split(data)
+    if b"HEIGHT" not in rows or b"WIDTH" not in rows:
         return 1
     (height,), (width,) = (
-        _numbers(words[key], "A size")[:1] or (0,) for key in (b"HEIGHT", b"WIDTH")
+        _numbers(rows[key], "A size")[:1] or (0,) for key in (b"HEIGHT", b"WIDTH")
     )
-    n_points = _header(lines).n_points
+    n_points = _header(rows).n_points
     if height > 1 and height * width != n_points:
         raise FileFormatError(
             f"A frame must have as many points as pixels; it declares {height} x {width} pixels "
@@ -103,16 +102,17 @@ def n_rows(data: bytes) -> int:
     return max(height, 1)
 
 
-def _split(data: bytes) -> tuple[list[Line], bytes, bytes]:
+def _split(data: bytes) -> tuple[dict[bytes, Line], bytes, bytes]:
+    """Return the lines of the header by their first word, the kind of the data, and the data."""
     place = data.find(b"\nDATA ")
     if place < 0:
         raise FileFormatError("A PCD file must have a line DATA; it has none.")
     kind, _, body = data[place + 6 :].partition(b"\n")
-    return lines_of(data[:place]), kind.strip(), body
+    rows = {line[1].split()[0]: line for line in lines_of(data[:place])}
+    return rows, kind.strip(), body
 
 
-def _header(lines: list[Line]) -> Header:
-    rows = {text.split()[0]: (number, text) for number, text in lines}
+def _header(rows: dict[bytes, Line]) -> Header:
     for name in (b"FIELDS", b"SIZE", b"TYPE", b"POINTS"):
         if name not in rows:
             raise FileFormatError(f"A PCD file must have a line {name.decode()}; it has none.")
