@@ -27,6 +27,7 @@ from eigenshape.io.formats.numbers import Cursor
 from eigenshape.io.formats.registry import suffix_of_bytes
 from eigenshape.io.formats.stl import single_precision
 
+WHAT = "A surface of FreeSurfer"
 # First bytes. Old surfaces of quadrangles begin as functions do.
 SURFACE, QUADRANGLES, CURVATURE = b"\xff\xff\xfe", b"\xff\xff\xfd", b"\xff\xff\xff"
 HUNDREDTHS = 100  # in a unit of numbers of 16 bits
@@ -43,15 +44,14 @@ def parse(data: bytes) -> tuple[Any, ...]:
 
     What follows the faces is left out; `footer_of` returns it.
     """
-    what = "A surface of FreeSurfer"
     if data.startswith(SURFACE):
-        cursor = Cursor(_after_text(data), what)
+        cursor = Cursor(_after_text(data), WHAT)
         n_vertices, n_faces = cursor.wholes(">i4", 2).tolist()
         vertices = cursor.take(">f4", 3 * n_vertices).reshape(-1, 3)
         faces = cursor.wholes(">i4", 3 * n_faces).reshape(-1, 3)
         return vertices.astype(np.float64), faces
     if data.startswith(b"#!ascii"):
-        cursor = Cursor(data, what, is_text=True, place=len(data.partition(b"\n")[0]))
+        cursor = Cursor(data, WHAT, is_text=True, place=len(data.partition(b"\n")[0]))
         n_vertices, n_faces = cursor.wholes("<i8", 2).tolist()
         # Each row ends in a mark: 1 for what was cut away; some programs store labels there.
         vertices = cursor.take("<f8", 4 * n_vertices).reshape(-1, 4)
@@ -61,13 +61,13 @@ def parse(data: bytes) -> tuple[Any, ...]:
         note = f"the marks behind {n_marked} of its vertices and faces, such as 1 for cut away, are not read"
         return vertices[:, :3], faces[:, :3], *[note][:n_marked]
     if suffix_of_bytes(data[:20], len(data)) == ".surf":
-        cursor = Cursor(data, what, place=3)
+        cursor = Cursor(data, WHAT, place=3)
         n_vertices, n_quads = _take_threes(cursor, 2).tolist()
         kind, unit = (">f4", 1) if data.startswith(QUADRANGLES) else (">i2", HUNDREDTHS)
         vertices = cursor.take(kind, 3 * n_vertices).reshape(-1, 3) / np.float64(unit)
         return vertices, {"quads": _take_threes(cursor, 4 * n_quads).reshape(-1, 4)}
     raise FileFormatError(
-        f"{what} must begin with the bytes ff ff fe; it begins with {data[:3].hex(' ')}. Functions on "
+        f"{WHAT} must begin with the bytes ff ff fe; it begins with {data[:3].hex(' ')}. Functions on "
         "vertices, which begin with ff ff ff, are read by es.io.read_fields."
     )
 
@@ -86,16 +86,17 @@ def footer_of(data: bytes) -> bytes:
     """Return what follows the triangles of a surface, such as the place of its volume, c_ras."""
     if not data.startswith(SURFACE):
         return b""
-    vertices, faces = parse(data)
     # Two counts, then three numbers a row
-    return _after_text(data)[8 + 12 * (len(vertices) + len(faces)) :]
+    rest = _after_text(data)
+    n_rows = Cursor(rest, WHAT).wholes(">i4", 2).sum()
+    return rest[8 + 12 * n_rows :]
 
 
 def format_binary(mesh: TriangleMesh) -> bytes:
     """Write a surface in single precision."""
     head = SURFACE + b"created by eigenshape\n\n"
     counts = np.array([mesh.n_vertices, mesh.n_faces], ">i4").tobytes()
-    points = single_precision(mesh, "A surface of FreeSurfer").astype(">f4").tobytes()
+    points = single_precision(mesh, WHAT).astype(">f4").tobytes()
     return head + counts + points + mesh.faces.astype(">i4").tobytes()
 
 
