@@ -128,7 +128,7 @@ def _join_basins(
     # The higher vertex is the highest of the face for two sides, the middle one for the third.
     n_sides = 2 * np.bincount(corners[:, 0], minlength=n)
     n_sides += np.bincount(corners[:, 1], minlength=n)
-    starts = np.concatenate([[0], np.cumsum(n_sides)])
+    starts = np.append(0, np.cumsum(n_sides))
     lower, owner = np.empty(3 * n_faces, dtype=kind), np.empty(3 * n_faces, dtype=kind)
     file_sides(corners, starts[:-1].copy(), lower, owner)
     climbs_to, ended = np.arange(n_faces, dtype=kind), np.empty((n_faces, 4), dtype=kind)

@@ -91,7 +91,7 @@ def _encode(
     sizes: Int[np.ndarray, " b"], edges: Int[np.ndarray, "2 e"], n_groups: int
 ) -> tuple[Float[np.ndarray, "n g"], Float[np.ndarray, "e g"], Float[np.ndarray, "b g"]]:
     """Encode graphs of some sizes, whose nodes are numbered one after the other."""
-    starts = np.concatenate([[0], np.cumsum(sizes)])
+    starts = np.append(0, np.cumsum(sizes))
     owner = np.searchsorted(starts, edges[0], side="right") - 1
     order = np.argsort(owner, kind="stable")
     first_edges = np.searchsorted(owner[order], np.arange(len(sizes) + 1))

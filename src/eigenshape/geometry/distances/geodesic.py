@@ -109,7 +109,7 @@ def geodesic_balls(mesh: MeshLike, radius: float) -> sp.csr_array:
     tasks = map_in_threads(waves_from, range(0, n, SOURCES_PER_TASK))
     parts = zip(*chain.from_iterable(tasks), strict=True)
     counts, columns, distances = (np.concatenate(part) for part in parts)
-    rows = np.concatenate([[0], np.cumsum(counts)])
+    rows = np.append(0, np.cumsum(counts))
     found = sp.csr_array((in_length(distances, scale, 1), columns, rows), shape=(n, n))
     found.sort_indices()
     # An entry that only one direction has is 0 in the other, and the minimum removes it.
@@ -278,7 +278,7 @@ def unchecked_rows(mesh: Mesh) -> Rows:
     def rows_of(
         sources: Int[np.ndarray, " s"], ends: Int[np.ndarray, " k"], reach: float = np.inf
     ) -> Float[np.ndarray, "k n"]:
-        rows, begin = np.empty((len(ends), n)), np.concatenate([[0], ends])
+        rows, begin = np.empty((len(ends), n)), np.append(0, ends)
 
         def fill_task(first: int) -> None:
             some = slice(first, first + ROWS_PER_TASK)

@@ -49,7 +49,7 @@ class CellLists:
         lengths = self.lengths[chosen]
         ends = np.cumsum(lengths)
         places = np.arange(lengths.sum()) + np.repeat(self.starts[chosen] - ends + lengths, lengths)
-        return CellLists(np.concatenate([[0], ends]), self.corners[places])
+        return CellLists(np.append(0, ends), self.corners[places])
 
     def pairs(self) -> Int[np.ndarray, "p 2"]:
         """Return the pairs of successive points in each list."""

@@ -159,7 +159,7 @@ def _straighten(
         f"cells with curved sides were read by their corners ({n_curved:,}), and the points between "
         f"corners were left out ({len(middles):,})"
     )
-    return CellLists(np.concatenate([[0], np.cumsum(lengths)]), corners), middles, [note]
+    return CellLists(np.append(0, np.cumsum(lengths)), corners), middles, [note]
 
 
 def fit_fields(shape: VtkShape, of_points: Arrays, of_cells: Arrays) -> tuple[Arrays, Arrays]:
