@@ -1,4 +1,4 @@
-"""Arrays that belong to a shape: checks of coordinates, indices, sources and values; equal rows, and linked ones."""
+"""Arrays that belong to a shape: checks of coordinates, indices, sources and values; equal rows, keys, and links."""
 
 from typing import Any
 
@@ -181,6 +181,15 @@ def label_components(
     first, second = (np.ascontiguousarray(end, dtype=np.int64) for end in (one, two))
     labels = np.empty(n, dtype=np.int64)
     return number_groups(first, second, labels), labels
+
+
+def find_keys(keys: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return the place of each value among the keys, or -1."""
+    if not len(keys):
+        return np.full(len(values), -1)
+    order = np.argsort(keys, kind="stable")
+    found = order[np.searchsorted(keys[order], values).clip(0, len(keys) - 1)]
+    return np.where(keys[found] == values, found, -1)
 
 
 def sorted_rows(

@@ -17,10 +17,10 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from certeig.kit.errors import FileFormatError
+from eigenshape._arrays import find_keys
 from eigenshape.io.formats.cells import CellLists, ParsedShape, require_splittable
 from eigenshape.io.formats.numbers import (
     Cursor,
-    find_keys,
     quote_line,
     require_distinct,
     whole,

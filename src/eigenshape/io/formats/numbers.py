@@ -113,15 +113,6 @@ def wholes(numbers: Shaped[np.ndarray, " k"], what: str) -> Int[np.ndarray, " k"
     return numbers.astype(np.int64)
 
 
-def find_keys(keys: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return the place of each value among the keys, or -1."""
-    if not len(keys):
-        return np.full(len(values), -1)
-    order = np.argsort(keys, kind="stable")
-    found = order[np.searchsorted(keys, values, sorter=order).clip(0, len(keys) - 1)]
-    return np.where(keys[found] == values, found, -1)
-
-
 def require_distinct(numbers: Int[np.ndarray, " k"], what: str) -> None:
     """Raise an error if a number occurs twice."""
     different, counts = np.unique(numbers, return_counts=True)

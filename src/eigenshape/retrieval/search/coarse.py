@@ -13,6 +13,7 @@ from numpy.lib.format import open_memmap, read_array
 from certeig.kit.arrays import ReadOnly, freeze, record
 from certeig.kit.errors import FileFormatError
 from certeig.kit.files import replacing
+from eigenshape._arrays import find_keys
 from eigenshape.retrieval.patches.code_loops import scan
 from eigenshape.retrieval.patches.descriptor import PatchRecipe
 from eigenshape.retrieval.patches.distance import N_REFERENCES, SIZE_PRICE, measure_isolations
@@ -192,15 +193,9 @@ def _completed(
     """Return rows with the wanted checksums: those that are kept, and the others made now."""
     if np.array_equal(kept.checksums[kept.rows], wanted):
         return kept
-    order = np.argsort(kept.checksums, kind="stable")
-    rows = np.zeros(len(wanted), dtype=np.int64)
-    known = np.zeros(len(wanted), dtype=bool)
-    if len(order):
-        places = np.searchsorted(kept.checksums[order], wanted)
-        rows = order[np.minimum(places, len(order) - 1)]
-        known = kept.checksums[rows] == wanted
-    missing = np.flatnonzero(~known)
-    rows[missing] = len(order) + np.arange(len(missing))
+    rows = find_keys(kept.checksums, wanted)
+    missing = np.flatnonzero(rows < 0)
+    rows[missing] = len(kept.checksums) + np.arange(len(missing))
     made = [kept.added]
     for first in range(0, len(missing), SHAPES_AT_ONCE):
         some = missing[first : first + SHAPES_AT_ONCE]

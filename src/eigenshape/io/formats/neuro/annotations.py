@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 
 from certeig.kit.errors import FileFormatError
+from eigenshape._arrays import find_keys
 from eigenshape.features.parcellation import Parcellation
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.formats.neuro.shared import NO_PARCEL, find_labels, shared_keys
-from eigenshape.io.formats.numbers import Cursor, coordinates, find_keys, lines_of, whole, wholes
+from eigenshape.io.formats.numbers import Cursor, coordinates, lines_of, whole, wholes
 
 WHAT = "An annotation file"
 PACKING = np.array([1, 2**8, 2**16])  # of red, green and blue into the number of a parcel

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from certeig.kit.errors import FileFormatError
+from eigenshape._arrays import find_keys
 from eigenshape._extras import import_extra
 from eigenshape.features.parcellation import Parcellation
-from eigenshape.io.formats.numbers import find_keys
 
 Arrays = dict[str, np.ndarray]
 UNNAMED = "values"  # name of a function that has none in its file

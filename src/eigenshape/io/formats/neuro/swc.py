@@ -10,8 +10,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from certeig.kit.errors import FileFormatError
+from eigenshape._arrays import find_keys
 from eigenshape.io.formats.numbers import (
-    find_keys,
     lines_of,
     number_table,
     require_distinct,
