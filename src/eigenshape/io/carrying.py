@@ -109,14 +109,20 @@ def wear_attributes(
         values = getattr(attributes, name)
         if values is not None:
             keys.append(np.rint(matrix @ values.reshape(matrix.shape[1], -1) / step))
-    _, first, groups = np.unique(
-        np.column_stack(keys), axis=0, return_index=True, return_inverse=True
-    )
-    worn = _gather(attributes, mesh, matrix[first[groups.ravel()]], starts)
+    first, groups = split_corners(keys)
+    worn = _gather(attributes, mesh, matrix[first[groups]], starts)
     # The mesh is smooth, also across seams of the texture.
     joined = join_places(mesh)[0]
     normals = mean_normals(joined)[joined.faces]
     return replace(worn, places=places, normals=normals)
+
+
+def split_corners(keys: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Make one vertex of all corners whose keys agree; return its first corner, and the indices."""
+    _, first, indices = np.unique(
+        np.column_stack(keys), axis=0, return_index=True, return_inverse=True
+    )
+    return first, indices.ravel()
 
 
 def _corner_matrix(

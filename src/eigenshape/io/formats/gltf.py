@@ -97,6 +97,12 @@ class Scene(NamedTuple):
     nodes: np.ndarray  # (f,) the node of each face
     placements: dict[int, Placement]  # by node
 
+    def parts(self) -> tuple[list[list[int]], np.ndarray]:
+        """Return the node and the number of each primitive that has faces, and each face's primitive in this list."""
+        size = self.piece.primitives.max() + 1
+        codes, owners = np.unique(self.nodes * size + self.piece.primitives, return_inverse=True)
+        return np.transpose(np.divmod(codes, size)).tolist(), owners
+
 
 @dataclass(frozen=True)
 class Gltf:
@@ -629,8 +635,8 @@ def read_column(gltf: Gltf, named: Entry, name: str, width: int, count: int) -> 
     return rows
 
 
-def read_accessor(gltf: Gltf, index: Any, width: int) -> np.ndarray:
-    """Read an accessor as float64, with as many numbers a row as `width`."""
+def read_accessor(gltf: Gltf, index: Any, width: int | None = None) -> np.ndarray:
+    """Read an accessor as float64; each row must have `width` numbers, if that is given."""
     return decode(*raw_accessor(gltf, index, width))
 
 

@@ -24,7 +24,7 @@ from eigenshape.io.attributes import (
     linear_colors,
     screen_colors,
 )
-from eigenshape.io.carrying import interpolate
+from eigenshape.io.carrying import interpolate, split_corners
 from eigenshape.io.formats.gltf import (
     COMPRESSIONS,
     INSTANCES,
@@ -43,6 +43,7 @@ from eigenshape.io.formats.gltf import (
     place_triangles,
     pose_matrices,
     raw_accessor,
+    read_accessor,
     read_beside,
     read_gltf,
     sides,
@@ -80,7 +81,7 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
     rows_of_corners = scene.piece.rows[scene.piece.faces]
     found: Entry = {}
     nodes = list(scene.placements)
-    parts, face_parts = _parts(scene)
+    parts, face_parts = scene.parts()
     face_materials, face_groups = np.full((2, len(face_parts)), -1)
     for number, (node, place) in enumerate(parts):
         chosen = np.flatnonzero(face_parts == number)
@@ -93,7 +94,7 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
         for key, (name, width) in columns.items():
             if name not in primitive["attributes"]:
                 continue
-            rows = decode(*raw_accessor(gltf, primitive["attributes"][name]))
+            rows = read_accessor(gltf, primitive["attributes"][name])
             if key == "colors" and rows.shape[1] == 3:
                 rows = np.pad(rows, ((0, 0), (0, 1)), constant_values=1.0)
             if rows.shape[1] != width:
@@ -131,13 +132,6 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
 def _open(source: SourceFile) -> tuple[Gltf, Scene]:
     gltf = read_gltf(source.data, source.folder if source.suffix == ".gltf" else None)
     return gltf, place_triangles(gltf, source.scene)
-
-
-def _parts(scene: Scene) -> tuple[list[list[int]], np.ndarray]:
-    """Return the node and the number of each primitive that has faces, and each face's primitive in this list."""
-    size = scene.piece.primitives.max() + 1
-    codes, owners = np.unique(scene.nodes * size + scene.piece.primitives, return_inverse=True)
-    return np.transpose(np.divmod(codes, size)).tolist(), owners
 
 
 def _take(rows: np.ndarray, corners: np.ndarray, name: str) -> np.ndarray:
@@ -249,7 +243,7 @@ def _rewrite(source: SourceFile, job: WriteJob) -> bytes:  # noqa: PLR0915 - a f
     gltf, scene = _open(source)
     document = _copy_document(gltf, source, job.lost)
     file_rows = scene.piece.rows[scene.piece.faces.ravel()]
-    nodes, primitive_numbers = np.array(_parts(scene)[0])[attributes.face_parts].T
+    nodes, primitive_numbers = np.array(scene.parts()[0])[attributes.face_parts].T
     places = mesh.vertices[mesh.faces]
     found = np.zeros_like(places)  # where the written file puts the corners
     normals = corner_normals(attributes, mesh)
@@ -283,7 +277,7 @@ def _rewrite(source: SourceFile, job: WriteJob) -> bytes:  # noqa: PLR0915 - a f
             keys = [rows[blends.indices]]
             if blends.nnz > 3 * len(chosen):
                 keys = [values for table in columns for values, _ in table.values()]
-            first, indices = _split_corners([vertices, *keys, np.rint(normal * 1e5)])
+            first, indices = split_corners([vertices, *keys, np.rint(normal * 1e5)])
             columns = [_choose_rows(table, first) for table in columns]
             wanted = places[chosen].reshape(-1, 3)[first]
             turned, put = _place_vertices(shown, columns, old[first], wanted, normal[first])
@@ -399,14 +393,6 @@ def _drop_extensions(tree: Entry, nodes: Iterable[int]) -> list[str]:
             for name in sorted(dropped.difference(COMPRESSIONS))]  # fmt: skip
 
 
-def _split_corners(keys: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Make one vertex of all corners whose keys agree; return its first corner, and the indices."""
-    _, first, indices = np.unique(
-        np.column_stack(keys), axis=0, return_index=True, return_inverse=True
-    )
-    return first, indices.ravel()
-
-
 def _blend(gltf: Gltf, index: int, name: str, rows: np.ndarray, blends: csr_array) -> Column:
     """Interpolate an attribute; joints, whose weights go along, and numbers of things are only chosen."""
     values, is_normalized = raw_accessor(gltf, index)
@@ -494,7 +480,7 @@ def write_new(attributes: MeshAttributes, mesh: TriangleMesh) -> bytes:
             first = vertices = np.arange(mesh.n_vertices)
             indices = corners
         else:
-            first, indices = _split_corners([corners, *rows.values()])
+            first, indices = split_corners([corners, *rows.values()])
             vertices = corners[first]
         table: Columns = {"POSITION": (places[vertices], False)}
         table |= {name: (values[first], False) for name, values in rows.items()}

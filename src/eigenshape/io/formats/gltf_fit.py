@@ -20,7 +20,6 @@ from eigenshape.io.formats.gltf import (
     Scene,
     decode,
     local_matrix,
-    raw_accessor,
     read_accessor,
     skin_weights,
     world_matrices,
@@ -117,26 +116,23 @@ def _file_weights(gltf: Gltf, scene: Scene) -> csr_array:
     rows = scene.piece.rows[scene.piece.faces]
     n_nodes = len(gltf.tree.get("nodes", []))
     entries: list[tuple[np.ndarray, ...]] = []
-    for node, place in scene.placements.items():
-        if place.bones is None or place.skin is None:
+    parts, owners = scene.parts()
+    for number, (node, primitive) in enumerate(parts):
+        place = scene.placements[node]
+        if place.skin is None:
             continue
         names = np.array(gltf.entry("skins", place.skin)["joints"])
-        primitives = gltf.entry("meshes", place.mesh)["primitives"]
-        for number, part in enumerate(primitives):
-            chosen = np.flatnonzero((scene.nodes == node) & (scene.piece.primitives == number))
-            if not chosen.size:
-                continue
-            columns = {
-                name: read_accessor(gltf, index, 4)
-                for name, index in part["attributes"].items()
-                if name.startswith(SKINS)
-            }
-            joints, weights, _ = skin_weights(columns, columns.__getitem__, len(names))
-            of_corners = rows[chosen].ravel()
-            corners = np.repeat((3 * chosen[:, None] + [0, 1, 2]).ravel(), joints.shape[1])
-            entries.append(
-                (weights[of_corners].ravel(), corners, names[joints[of_corners]].ravel())
-            )
+        part = gltf.entry("meshes", place.mesh)["primitives"][primitive]
+        chosen = np.flatnonzero(owners == number)
+        columns = {
+            name: read_accessor(gltf, index, 4)
+            for name, index in part["attributes"].items()
+            if name.startswith(SKINS)
+        }
+        joints, weights, _ = skin_weights(columns, columns.__getitem__, len(names))
+        of_corners = rows[chosen].ravel()
+        corners = np.repeat((3 * chosen[:, None] + [0, 1, 2]).ravel(), joints.shape[1])
+        entries.append((weights[of_corners].ravel(), corners, names[joints[of_corners]].ravel()))
     entries.append((np.empty(0), *np.empty((2, 0), dtype=np.int64)))
     values, corners, nodes = (np.concatenate(column) for column in zip(*entries, strict=True))
     return csr_array(coo_array((values, (corners, nodes)), shape=(rows.size, n_nodes)))
@@ -244,7 +240,7 @@ def _scale_motions(
             node = channel["target"].get("node")
             if channel["target"]["path"] != "translation" or node not in steps:
                 continue
-            rows = decode(*raw_accessor(gltf, sampler["output"], 3))
+            rows = read_accessor(gltf, sampler["output"], 3)
             before, after = steps[node]
             # Between its tangents, each third row of a cubic spline is a place.
             is_place = np.ones(len(rows), dtype=bool)
