@@ -127,7 +127,11 @@ def rotation_nulls(
         for index in range(count):
             nulls[:, index] += rest if residual == "add" else rng.permutation(rest, axis=0)
     if resample == "exact":
-        _take_values(nulls, np.sort(columns, axis=0))
+        # Each null takes the values of the map, the smallest where the null is smallest.
+        ascending = np.sort(columns, axis=0)
+        for index in range(count):
+            null = nulls[:, index]
+            np.put_along_axis(null, np.argsort(null, axis=0), ascending, axis=0)
     elif resample == "affine":
         mean, square = _moments(columns, spectrum)
         for index in range(count):
@@ -166,13 +170,3 @@ def _moments(
     mean = areas @ maps / areas.sum()
     deviations = maps - mean
     return mean, np.sum(deviations * (spectrum.mass @ deviations), axis=0)
-
-
-def _take_values(
-    nulls: Float[np.ndarray, "n nulls q"], ascending: Float[np.ndarray, "n q"]
-) -> None:
-    """Give each null the values of the map, the smallest where the null is smallest."""
-    for index in range(nulls.shape[1]):
-        order = np.argsort(nulls[:, index], axis=0)
-        for column in range(nulls.shape[2]):
-            nulls[order[:, column], index, column] = ascending[:, column]
