@@ -86,8 +86,6 @@ def near_pairs(some: Points, others: Points, distance: float) -> Pairs:
 
     Raise InvalidShapeError if the pairs do not fit into half of the memory.
     """
-    if not len(some) or not len(others):
-        return Pairs(np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64), np.empty(0))
     # The tree compares powers of distances, with a rounding of its own: it returns a few more, and
     # the comparison below decides.
     reach = distance * (1 + DISTANCE_ROUNDING)
