@@ -25,7 +25,7 @@ N_VOTES = 5  # best matches whose labels count; ten were no better
 LEAST_SCORE = 0.01  # so that powers stay finite
 
 
-def chances(scores: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
+def chances(scores: float | Float[np.ndarray, " k"]) -> Float[np.ndarray, "*k"]:
     """Return for each score the share of unrelated shapes that would score as well or better."""
     return np.asarray(np.exp(np.interp(scores, SCORES, np.log(SHARES))))
 

@@ -83,7 +83,7 @@ def search_candidates(
         view = int(columns["view"][place])
         match = Match(facts.name, facts.label, facts.source, score, query, stored, view)
         if isinstance(query, PatchDescriptor):
-            chance = float(chances(np.array([score]))[0])
+            chance = float(chances(score))
             match = replace(match, chance=chance, distance=float(distances[number]))
         matches.append(match)
     nothing = False

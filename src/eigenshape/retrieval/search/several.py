@@ -8,8 +8,6 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from certeig.kit.arguments import require_type
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.files import as_path
@@ -120,7 +118,7 @@ def query_indexes(
     )
     for place, match in enumerate(found[N_VERIFIED:], N_VERIFIED):
         if match.distance is not None:
-            chance = float(chances(np.array([match.distance]))[0])
+            chance = float(chances(match.distance))
             found[place] = replace(match, score=match.distance, chance=chance)
     found.sort(key=lambda match: (match.score, match.name))
     return Matches(
