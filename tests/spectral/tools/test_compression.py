@@ -98,7 +98,7 @@ def test_eigenvalues_of_symmetric_patches_are_separated():
     ball = es.icosphere(2)
     graph, patches = patch_basis.find_patches(ball.faces, ball.n_vertices)
     assert len(patches) == 1
-    for laplacian in patch_basis.patch_laplacians(graph, patches):
+    for _, laplacian in patch_basis.patch_laplacians(graph, patches):
         assert np.diff(np.linalg.eigvalsh(laplacian)).min() < 1e-10
         seed, basis = patch_basis.find_seed(laplacian)
         values, again, components = patch_basis.patch_basis(laplacian, seed)

@@ -163,9 +163,7 @@ def compress_mesh(
     graph, patches = find_patches(faces, len(points))
     seeds, means, coefficients = bytearray(), [], []
     squares, largest = 0.0, 0.0
-    for number, (patch, laplacian) in enumerate(
-        zip(patches, patch_laplacians(graph, patches), strict=True)
-    ):
+    for number, (patch, laplacian) in enumerate(patch_laplacians(graph, patches)):
         report(0.1 + 0.9 * number / len(patches), "coefficients")
         seed, basis = find_seed(laplacian)
         places = (points[patch] - low) / step
@@ -256,9 +254,7 @@ def decompress_mesh(data: bytes, *, progress: Progress | None = None) -> Triangl
     coefficients[_frequency_order(patches)] = numbers.reshape(-1, 3)
     start = 0
     points = np.empty((n, 3))
-    for number, (patch, laplacian) in enumerate(
-        zip(patches, patch_laplacians(graph, patches), strict=True)
-    ):
+    for number, (patch, laplacian) in enumerate(patch_laplacians(graph, patches)):
         report(0.1 + 0.9 * number / len(patches), "coordinates")
         _, basis, _ = patch_basis(laplacian, seeds[number])
         with np.errstate(over="ignore", invalid="ignore"):  # the result is checked below

@@ -66,11 +66,11 @@ def _order_from_one_end(graph: sp.csr_array) -> Int[np.ndarray, " n"]:
 
 def patch_laplacians(
     graph: sp.csr_array, patches: list[np.ndarray]
-) -> Iterator[Float[np.ndarray, "p p"]]:
-    """Yield the combinatorial Laplacian of each patch, without the edges that leave it."""
+) -> Iterator[tuple[np.ndarray, Float[np.ndarray, "p p"]]]:
+    """Yield each patch and its combinatorial Laplacian, without the edges that leave it."""
     for patch in patches:
         adjacency = graph[patch][:, patch].toarray()
-        yield np.diag(adjacency.sum(axis=1)) - adjacency
+        yield patch, np.diag(adjacency.sum(axis=1)) - adjacency
 
 
 def patch_basis(
