@@ -1,6 +1,6 @@
 """The direction of the view, and where the points of a shape lie in the picture."""
 
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from jaxtyping import Float
@@ -17,7 +17,8 @@ from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table
 
-Up = TypeAliasType("Up", Literal["auto", "x", "y", "z", "-x", "-y", "-z"] | ArrayLike)
+UpName = Literal["auto", "x", "y", "z", "-x", "-y", "-z"]
+Up = TypeAliasType("Up", UpName | ArrayLike)
 View = TypeAliasType(
     "View",
     Literal[
@@ -35,7 +36,7 @@ View = TypeAliasType(
     ]
     | ArrayLike,
 )
-UP_NAMES = ("auto", "x", "y", "z", "-x", "-y", "-z")
+UP_NAMES = get_args(UpName)
 # The parts of front, left and up in the direction to the viewer, for each name of a view. Views of
 # two words are a little from above.
 VIEWS = {
