@@ -34,7 +34,7 @@ LEAST_SPREAD = 0.05  # of the nearest points in the second direction, relative t
 # Share of points that a surface may miss, which means to be more than two cells away from them.
 MOST_MISSED, MISSED_CELLS = 0.1, 2.0
 
-CUBE = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
+CUBE = np.array(list(np.ndindex(2, 2, 2)))
 # Six tetrahedra around the diagonal of a cube; those of neighboring cubes fit together. An axis
 # takes 4, 2 or 1 steps in `CUBE`.
 TETRAHEDRA = np.array([[0, one, one + two, 7] for one, two, _ in permutations((4, 2, 1))])
