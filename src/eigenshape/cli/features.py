@@ -89,7 +89,7 @@ def features(
         {"--n-parts": False, "--persistence": is_persistence, "--largest-gap": largest_gap}
     )
     side = steps.picture_side(view, up, picture, shapes=[mesh])
-    steps.require_mesh_path(output, colors=True)
+    steps.require_mesh_path(output, "colors")
     recipe = steps.PRESETS[method]
     surface = steps.load_surface(mesh, repair)
     with progress_bar("features") as progress:

@@ -100,8 +100,8 @@ def add(
     folders = [source for source in sources if source.is_dir()]
     pruned = opened.prune(*folders) if prune else []
     if as_json:
-        facts = {"index": index, "shapes": len(opened), **result_facts(report)}
-        print_json(facts | {"pruned": pruned})
+        facts = result_facts(report) | {"pruned": pruned}
+        print_json({"index": index, "shapes": len(opened), **facts})
     else:
         for name, done in report.repaired:
             err.print(f"[yellow]repaired:[/] {escape_text(name)}: {escape_text('; '.join(done))}")
@@ -204,8 +204,7 @@ def verify(index: Path, *, as_json: bool = False) -> None:
     """
     report = es.ShapeIndex.open(index).verify()
     if as_json:
-        counts = {"shapes": report.n_shapes, "bytes": report.n_bytes}
-        print_json(counts | {"damages": report.damages})
+        print_json({"shapes": report.n_shapes, "bytes": report.n_bytes, "damages": report.damages})
     else:
         for damage in report.damages:
             out.print(f"[red]damaged:[/] {escape_text(damage)}")
@@ -280,8 +279,8 @@ def merge(
     recipe = opened.default_recipe()
     apart = [record.name for record in opened.records() if recipe not in record.recipes]
     if as_json:
-        facts = {"index": index, "added": n_added, "shapes": len(opened)}
-        print_json(facts | {"not_compared": apart})
+        shapes = len(opened)
+        print_json({"index": index, "added": n_added, "shapes": shapes, "not_compared": apart})
     else:
         out.print(f"{count_shapes(n_added)} added; the index holds {len(opened)}.")
     if apart:

@@ -56,7 +56,7 @@ def label(
         Draw the best matching labeled mesh and this one (PNG, SVG or PDF).
     """
     side = steps.picture_side(view, up, picture, shapes=[mesh])
-    steps.require_mesh_path(output, labels=True)
+    steps.require_mesh_path(output, "labels")
     examples, left_out = steps.read_examples(like or [], labels or [], library, repair)
     names = es.io.read_label_names(library) if library else []
     target = steps.load_surface(mesh, repair)

@@ -84,7 +84,7 @@ def segment(
             raise InvalidParameterError(f"--level must be finite; it is {level}.")
         persistence = contrast_at(level)
     side = steps.picture_side(view, up, picture, shapes=[mesh])
-    steps.require_mesh_path(output, labels=True)
+    steps.require_mesh_path(output, "labels")
     surface = steps.load_surface(mesh, repair)
     with progress_bar("parts") as progress:
         tree, usual, smooth_parts = steps.find_tree(surface, method, progress)

@@ -186,9 +186,10 @@ def _boundary_points(shape: Any, order: int) -> Any:
 def _print(found: es.Spectrum, bounds: Any) -> None:
     """Print a table of the eigenvalues, and what is proved about them."""
     columns, first = ["i", "λ", "error at most"], found.certificate.first
-    rows = []
-    for index, value in enumerate(found.eigenvalues):
-        rows.append([str(first + index), f"{value:.10g}", f"{found.residuals[index]:.1e}"])
+    rows = [
+        [str(first + index), f"{value:.10g}", f"{found.residuals[index]:.1e}"]
+        for index, value in enumerate(found.eigenvalues)
+    ]
     if bounds:
         columns += ["lower", "upper"]
         ends = zip(rows, bounds.lower[first:], bounds.upper[first:], strict=True)

@@ -78,8 +78,8 @@ def describe_all(
     recipe: HeatRecipe | PatchRecipe | None,
     workers: Workers,
     *,
-    repairs: tuple[str, ...] = (),
-    n_views: int | None = None,
+    repairs: tuple[str, ...],
+    n_views: int | None,
 ) -> BatchReport:
     """Build an index with a progress bar, naming each file that fails as soon as it does.
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TypedDict
+from typing import Literal, TypedDict
 
 import numpy as np
 from jaxtyping import Float, Int, UInt8
@@ -70,14 +70,11 @@ def _name_or_direction(text: str, option: str, names: tuple[str, ...]) -> str | 
     return numbers
 
 
-def require_mesh_path(path: Path | None, *, colors: bool = False, labels: bool = False) -> None:
+def require_mesh_path(path: Path | None, more: Literal["", "colors", "labels"] = "") -> None:
     """Raise an error if no mesh can be written to a path, or none with colors or labels."""
-    if labels:
-        require_output(path, (*WITH_COLORS, *LABEL_LISTS), "A mesh with labels")
-    elif colors:
-        require_output(path, WITH_COLORS, "A mesh with colors")
-    else:
-        require_output(path, WRITTEN, "A mesh")
+    with_labels = (*WITH_COLORS, *LABEL_LISTS)
+    suffixes = {"": WRITTEN, "colors": WITH_COLORS, "labels": with_labels}[more]
+    require_output(path, suffixes, f"A mesh with {more}" if more else "A mesh")
 
 
 def require_output(path: Path | None, suffixes: Sequence[str], what: str) -> None:
