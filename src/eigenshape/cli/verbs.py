@@ -92,7 +92,7 @@ class Verbs(TyperGroup):
 
     def module(self, name: str) -> str:
         """Return the module of a verb."""
-        return f"eigenshape.cli.{TOGETHER.get(name, name).replace('-', '_')}"
+        return f"eigenshape.cli.{TOGETHER.get(name, name)}"
 
     def get_params(self, ctx: Any) -> list[Any]:
         """Return the options before the verb, as help lists them."""
@@ -121,7 +121,7 @@ class Verbs(TyperGroup):
             return IndexVerbs(
                 name=name, help=help_text, rich_markup_mode=MARKUP, no_args_is_help=True
             )
-        verb = command_of(getattr(import_module(self.module(name)), name.replace("-", "_")))
+        verb = command_of(getattr(import_module(self.module(name)), name))
         parameters = inspect.signature(verb).parameters.values()
         takes_something = any(parameter.default is parameter.empty for parameter in parameters)
         alone = typer.Typer(
@@ -153,7 +153,7 @@ def first_line(module: str, verb: str) -> str:
     place = find_spec(module).origin  # type: ignore[union-attr]  # it is there
     text = Path(str(place)).read_text(encoding="utf-8")
     # `index` is no function, and has the docstring of its module.
-    text = text.partition(f"\ndef {verb.replace('-', '_')}(")[2] or text
+    text = text.partition(f"\ndef {verb}(")[2] or text
     return " ".join(text.split('"""')[1].split("\n\n")[0].split())
 
 
