@@ -43,8 +43,8 @@ class Header:
 
 def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], np.ndarray, *tuple[str, ...]]:
     """Read x, y and z; other fields are named. Missing returns remain NaN, as in the file."""
-    rows, kind, body = _split(data)
-    header = _header(rows)
+    lines, kind, body = _split(data)
+    header = _header(lines)
     n_points, record = header.n_points, header.record
     notes = (
         [f"the fields {b', '.join(header.others).decode('latin-1')} are not read"]
@@ -87,13 +87,13 @@ def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], np.ndarray, *tuple[str
 
 def n_rows(data: bytes) -> int:
     """Return the rows of a depth scan, or 1 for points without an order."""
-    rows, _, _ = _split(data)
-    if b"HEIGHT" not in rows or b"WIDTH" not in rows:
+    lines, _, _ = _split(data)
+    if b"HEIGHT" not in lines or b"WIDTH" not in lines:
         return 1
     (height,), (width,) = (
-        _numbers(rows[key], "A size")[:1] or (0,) for key in (b"HEIGHT", b"WIDTH")
+        _numbers(lines[key], "A size")[:1] or (0,) for key in (b"HEIGHT", b"WIDTH")
     )
-    n_points = _header(rows).n_points
+    n_points = _header(lines).n_points
     if height > 1 and height * width != n_points:
         raise FileFormatError(
             f"A frame must have as many points as pixels; it declares {height} x {width} pixels "
@@ -108,18 +108,18 @@ def _split(data: bytes) -> tuple[dict[bytes, Line], bytes, bytes]:
     if place < 0:
         raise FileFormatError("A PCD file must have a line DATA; it has none.")
     kind, _, body = data[place + 6 :].partition(b"\n")
-    rows = {line[1].split()[0]: line for line in lines_of(data[:place])}
-    return rows, kind.strip(), body
+    lines = {line[1].split()[0]: line for line in lines_of(data[:place])}
+    return lines, kind.strip(), body
 
 
-def _header(rows: dict[bytes, Line]) -> Header:
+def _header(lines: dict[bytes, Line]) -> Header:
     for name in (b"FIELDS", b"SIZE", b"TYPE", b"POINTS"):
-        if name not in rows:
+        if name not in lines:
             raise FileFormatError(f"A PCD file must have a line {name.decode()}; it has none.")
-    names = tuple(rows[b"FIELDS"][1].split()[1:])
-    sizes = _numbers(rows[b"SIZE"], "A size")
-    counts = _numbers(rows[b"COUNT"], "A count") if b"COUNT" in rows else (1,) * len(names)
-    kinds = tuple(rows[b"TYPE"][1].split()[1:])
+    names = tuple(lines[b"FIELDS"][1].split()[1:])
+    sizes = _numbers(lines[b"SIZE"], "A size")
+    counts = _numbers(lines[b"COUNT"], "A count") if b"COUNT" in lines else (1,) * len(names)
+    kinds = tuple(lines[b"TYPE"][1].split()[1:])
     if (
         not len(names) == len(sizes) == len(counts) == len(kinds)
         or min((*sizes, *counts), default=0) < 1
@@ -140,7 +140,7 @@ def _header(rows: dict[bytes, Line]) -> Header:
         raise FileFormatError(
             f"Coordinates of a PCD file must be floats of 4 or 8 bytes; {'xyz'[types.index(None)]} is not."
         )
-    (n_points,) = _numbers(rows[b"POINTS"], "A number of points")[:1] or (0,)
+    (n_points,) = _numbers(lines[b"POINTS"], "A number of points")[:1] or (0,)
     if n_points < 1:
         raise FileFormatError(f"A PCD file must hold points; it declares {n_points}.")
     n_bytes = [size * count for size, count in zip(sizes, counts, strict=True)]
