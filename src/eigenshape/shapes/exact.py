@@ -15,14 +15,14 @@ from certeig.kit.errors import InvalidParameterError
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike, Integer
 from eigenshape.operators.choices import Condition
-from eigenshape.shapes.harmonics import MOST_HARMONICS
 
-# Nodes of the Gauss rule of `sphere_functional_eigenvalues`: enough for `MOST_HARMONICS`, which
-# end at degree 316, over the whole sphere.
+# Nodes of the Gauss rule of `sphere_functional_eigenvalues`: enough for harmonics of degree 300
+# over the whole sphere.
 N_GAUSS_NODES = 600
 # The integral of exp(-u) ends here: exp(-60) is 1e-26, far below rounding.
 NEGLIGIBLE_EXPONENT = 60.0
 MOST_EIGENVALUES = 10**7  # of shapes that have a formula: 80 MB, and some times as much meanwhile
+MOST_HARMONICS = 10**5  # up to degree 316, which N_GAUSS_NODES is made for
 # Frequencies of a flat torus are looked for up to this number along each period: (2·1000 + 1)²
 # pairs of them take 64 MB.
 MOST_FREQUENCY = 1000
