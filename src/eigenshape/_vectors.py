@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, Int, Real
 
 # How much the rotation of points follows a given one, as a share of their moments: a rotation about
 # the own axis of a limb as round as a finger, or of an eye, is hardly shown by its points.
@@ -40,6 +40,12 @@ def unit_vectors(vectors: Float[np.ndarray, "k d"]) -> Float[np.ndarray, "k d"]:
     """Give vectors the length 1, and make zeros of those without one."""
     norms = np.linalg.norm(vectors, axis=1, keepdims=True)
     return np.divide(vectors, norms, out=np.zeros_like(vectors), where=norms > 0)
+
+
+def unit_vector(vector: Real[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
+    """Give a vector the length 1, however long or short it is; it must not be zero."""
+    vector = vector / np.abs(vector).max()
+    return vector / np.linalg.norm(vector)
 
 
 def frames_across(normals: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "k 2 3"]:

@@ -10,6 +10,7 @@ from certeig.kit.arguments import require_each, require_type
 from certeig.kit.arrays import EPS, ReadOnly, finite_number, finite_values, freeze, record
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike
+from eigenshape._vectors import unit_vector
 
 
 class _Motion(ReadOnly):
@@ -77,8 +78,7 @@ class Rotation(_Motion):
         length = largest * np.linalg.norm(direction / largest)
         # An axis of length 1 keeps its last digits.
         if abs(length - 1) > 4 * EPS:
-            direction = direction / largest
-            direction = direction / np.linalg.norm(direction)
+            direction = unit_vector(direction)
         vars(self).update(
             pivot=freeze(as_vector(pivot, "pivot")),
             axis=freeze(direction),

@@ -12,7 +12,7 @@ from certeig.kit.arrays import TINY, ReadOnly, real_numbers, record, whole_numbe
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike
-from eigenshape._vectors import area_vectors, row_dots, scale_to_unit, triangle_areas
+from eigenshape._vectors import area_vectors, row_dots, scale_to_unit, triangle_areas, unit_vector
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table
@@ -232,8 +232,7 @@ def _direction(value: View, name: str, names: tuple[str, ...]) -> Float[np.ndarr
             f"{name} must be a direction, three finite numbers that are not all 0, or one of "
             f"{', '.join(names)}; it is {vector.tolist()}."
         )
-    vector = vector / np.abs(vector).max()
-    return vector / np.linalg.norm(vector)
+    return unit_vector(vector)
 
 
 def _guess_front(

@@ -12,7 +12,7 @@ from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike, Integer
 from eigenshape._corners import mean_normals
 from eigenshape._errors import InvalidShapeError
-from eigenshape._vectors import scale_to_unit
+from eigenshape._vectors import scale_to_unit, unit_vector
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.face_turns import orient_consistently
 from eigenshape.geometry.measure import face_areas
@@ -203,8 +203,7 @@ def unit_direction(view: ArrayLike | np.random.Generator) -> Float[np.ndarray, "
         raise InvalidParameterError(
             f"view must be three finite numbers that are not all zero; it is {vector.tolist()}."
         )
-    vector = vector / np.abs(vector).max()
-    return vector / np.linalg.norm(vector)
+    return unit_vector(vector)
 
 
 def rotation_towards(view: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
