@@ -345,15 +345,12 @@ def fit_allometry(shapes: Specimens, sizes: ArrayLike) -> Allometry:
     explained = (steps @ steps) * np.sum(slope**2)
     fitted = found.mean + steps[:, None, None] * slope
 
-    def effect(steps: np.ndarray, axis: int) -> np.ndarray | np.float64:
-        return np.linalg.norm(steps @ found.scores, axis=-1)
-
     return Allometry(
         found.mean,
         slope,
         float(logs.mean()),
         float(min(explained / np.sum(found.scores**2), 1.0)),  # not 1 + rounding errors
-        _p_value([steps], effect, "pairings"),
+        _p_value([steps], _sum_length(found.scores), "pairings"),
         np.tensordot(points - found.mean, slope, axes=2) / np.linalg.norm(slope),
         points - fitted,
     )
@@ -460,14 +457,16 @@ def symmetric_components(specimens: Specimens, pairs: ArrayLike) -> SymmetricCom
     )
     shares = squares / (squares.sum() or 1.0)
     flat = asymmetric.reshape(len(points), -1)
-
-    def difference(signs: np.ndarray, axis: int) -> np.ndarray | np.float64:
-        return np.linalg.norm(signs @ flat, axis=-1)
-
     # One specimen has the same difference, whichever side is left.
-    p_value = _p_value([np.ones(len(points))], difference, "samples") if len(points) > 1 else 1.0
+    signs = np.ones(len(points))
+    p_value = _p_value([signs], _sum_length(flat), "samples") if len(points) > 1 else 1.0
     individual, side, interaction = shares.tolist()
     return SymmetricComponents(symmetric, asymmetric, individual, side, interaction, p_value)
+
+
+def _sum_length(rows: Float[np.ndarray, "n q"]) -> Callable[..., np.ndarray | np.float64]:
+    """Return a statistic: the length of the sum of rows, each times a factor that is permuted."""
+    return lambda factors, axis: np.linalg.norm(factors @ rows, axis=-1)
 
 
 def _p_value(
