@@ -231,7 +231,7 @@ def relax(
             shares, *_ = np.linalg.lstsq(gram, right, rcond=PARALLEL_CHANGES)
             last = steps[-1][1]
             pairs = zip(shares, steps, strict=False)
-            tried = last - sum((share * (last - old) for share, (_, old) in pairs), np.zeros(3))
+            tried = last - sum(share * (last - old) for share, (_, old) in pairs)
     found[free] = solved
     return found
 

@@ -16,7 +16,7 @@ from certeig.kit.typing import Integer
 from eigenshape.deformation.binding import Binding, bind
 from eigenshape.deformation.deform import bend, move_by_shares
 from eigenshape.deformation.edits import Edit, Move, apply_edit, carry_edit
-from eigenshape.deformation.handles import Handle, require_handle
+from eigenshape.deformation.handles import Handle
 from eigenshape.deformation.modes import Mode, require_mode
 from eigenshape.deformation.region import Region, region_mask
 from eigenshape.deformation.rig import EigenRig, pose_rig
@@ -163,7 +163,6 @@ class DeformationSession:
         InvalidParameterError
             As for `bind`.
         """
-        require_handle(handle)
         return self.drag_all([Move(region, handle)], fixed=fixed, n_modes=n_modes)
 
     def drag_all(
@@ -195,9 +194,9 @@ class DeformationSession:
             As for `bind`.
         """
         number = None if n_modes is None else whole_number(n_modes, "n_modes", 1, self.rig.n_modes)
-        moves = tuple(moves) if isinstance(moves, Iterable) else moves
-        require_each(moves, Move, "moves")
-        edit = Edit(tuple(moves), fixed, number, self._mode)
+        # An edit refuses what are no moves.
+        listed = tuple(moves) if isinstance(moves, Iterable) else moves
+        edit = Edit(listed, fixed, number, self._mode)
         with self._lock:
             if self._pending is None or not self._same_regions(edit, self._pending[0]):
                 regions = [move.region for move in edit.moves]
