@@ -10,6 +10,7 @@ from eigenshape.deformation.deform import bend, deform, move_by_shares, require_
 from eigenshape.deformation.handles import Rotation, Translation
 from eigenshape.deformation.region import region_boundary
 from eigenshape.deformation.rig import eigen_skeleton, rig_shape
+from eigenshape.deformation.session import DeformationSession
 from eigenshape.deformation.thesis import (
     blend_details,
     frame_details,
@@ -19,12 +20,12 @@ from eigenshape.deformation.thesis import (
     turn_by_handles,
 )
 from eigenshape.geometry.distances.crossings import self_intersections
-from eigenshape.geometry.measure import face_areas
+from eigenshape.geometry.measure import edge_lengths, face_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import disjoint_union, edge_table
 from eigenshape.shapes.creatures import make_creature
 from eigenshape.shapes.domains import box
-from eigenshape.shapes.surfaces import torus
+from eigenshape.shapes.surfaces import grid, torus
 
 TURN = Rotation([0.6, 0, 0], [0, 1, 2], 1.2)
 HEAD = lump().vertices[:, 0] > 0.6
@@ -265,6 +266,23 @@ def test_a_bend_of_a_tube_turns_its_end_as_a_whole():
     np.testing.assert_allclose(
         bent[top], np.column_stack([rest[:, 0], 3 - rest[:, 2], 3 + rest[:, 1]])[top], atol=1e-14
     )
+
+
+@pytest.mark.parametrize("mode", ["graded", "uncrossed", "thesis"])
+@pytest.mark.parametrize("gap", [0.02, 0.15])
+def test_fixed_vertices_stay_however_near_the_region_lies(gap, mode):
+    """The fit is above 0 on them, up to 0.5 here, and the modes move them by up to 0.27."""
+    rig = rig_shape(grid(40, 40))
+    rest, moved = rig.mesh.vertices, Translation([0.1, 0, 0.2])
+    x = rest[:, 0] / rest[:, 0].max()
+    region, fixed = x > 0.8, x < 0.8 - gap
+    session = DeformationSession(rig, mode=mode)
+    session.drag(region, moved, fixed=fixed)
+    np.testing.assert_array_equal(session.preview()[fixed], rest[fixed])
+    bent = session.commit()
+    np.testing.assert_allclose(bent.vertices[fixed], rest[fixed], rtol=0, atol=1e-15)
+    # Where fixed vertices are set back alone, edges at their border become up to 6 times as long.
+    assert (edge_lengths(bent) / edge_lengths(rig.mesh)).max() < 4.5
 
 
 def test_the_start_of_a_graded_bend_is_each_vertex_by_its_share():

@@ -22,6 +22,7 @@ from eigenshape.deformation.rigidity import (
     free_part,
     pull_part,
     require_fixed_vertices,
+    spread_harmonically,
 )
 from eigenshape.geometry.distances.geodesic import geodesic_distances
 
@@ -56,6 +57,8 @@ class Binding(ReadOnly):
         Geodesic distance of each vertex to the boundary of each region, in length.
     shares : (r, n) float
         By how much each vertex follows each handle, 0 to 1.
+    fixed : (n,) bool
+        The vertices that were given as `fixed`; without any, none.
     part : FreePart
         The free vertices and their equations. The others stay or follow a handle exactly (`held`).
 
@@ -78,6 +81,7 @@ class Binding(ReadOnly):
     n_modes: Int[np.ndarray, " r"]
     distances: Float[np.ndarray, "r n"]
     shares: Float[np.ndarray, "r n"]
+    fixed: Bool[np.ndarray, " n"]
     part: FreePart
 
     @property
@@ -101,7 +105,8 @@ def bind(
     The indicator function of a region is fitted by the lowest modes. The fit falls smoothly from 1
     to 0 across the boundary of the region: few modes spread the bend over a wide band, many modes
     over a narrow one. Without `fixed`, all vertices outside the regions are fitted to 0. With
-    `fixed`, only the fixed vertices are, and the others follow smoothly.
+    `fixed`, only the fixed vertices are, and the others follow smoothly. Fixed vertices never move:
+    their shares are set to 0. If they lie close to a region, edges between are stretched.
 
     A region may consist of several connected patches, down to single vertices. The depth and the
     number of modes are those of each patch, and each follows the handle. Only small patches that
@@ -207,9 +212,14 @@ def bind(
     placed = known & ((shares == 0).all(axis=0) | (shares == 1).any(axis=0))
     if not still.any():
         placed = _placed_beyond_rims(rig, patches, placed)
-    part = free_part(rig.edges, placed)
+    part = free_part(rig.edges, placed | still)
+    if still.any():
+        # Near a region the fit is above 0 on fixed vertices, too. There it is set to 0, and around
+        # them lowered smoothly: a preview by shares would tear at the border otherwise.
+        excess = np.where(still, shares, 0)
+        shares = np.maximum(shares - spread_harmonically(part, excess.T).T, 0)
     most = np.array([max(group) for group in counts])
-    return Binding(rig, masks, most, distances, shares, part)
+    return Binding(rig, masks, most, distances, shares, still, part)
 
 
 def pull_binding(binding: Binding, strength: float) -> Binding:

@@ -129,6 +129,17 @@ def pull_part(part: FreePart, pull: Float[np.ndarray, " n"]) -> FreePart:
     return replace(part, pull=strength, factor=factor_equations(square, part.factor))
 
 
+def spread_harmonically(
+    part: FreePart, values: Float[np.ndarray, "n k"]
+) -> Float[np.ndarray, "n k"]:
+    """Return the values with those of free vertices replaced by harmonic ones; no pull counts."""
+    spread = values.copy()
+    if part.factor is not None:
+        spread[part.free] = 0
+        spread[part.free] = -part.factor.solve(part.rows @ spread)
+    return spread
+
+
 def require_fixed_vertices(edges: EdgeWeights, fixed: Bool[np.ndarray, " n"]) -> None:
     """Raise an error if a component has no fixed vertex."""
     n_components, component = connected_components(edges.matrix, directed=False)

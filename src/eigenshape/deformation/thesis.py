@@ -14,6 +14,7 @@ from eigenshape._vectors import row_dots
 from eigenshape.deformation.binding import Binding
 from eigenshape.deformation.handles import Handle, affine_offset, require_handles
 from eigenshape.deformation.rig import eigen_skeleton, project_on_modes
+from eigenshape.deformation.rigidity import spread_harmonically
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table
 
@@ -358,18 +359,23 @@ def eigen_deformation(
     """
     require_type(skeleton, DetailedSkeleton, "skeleton")
     require_handles(handles, len(skeleton.response.weights))
-    rig, faces = skeleton.binding.rig, skeleton.binding.rig.mesh.faces
+    binding = skeleton.binding
+    rig, faces = binding.rig, binding.rig.mesh.faces
     moved = move_skeleton(skeleton.response, handles)
     by_frames = turn_by_frames(faces, skeleton.first, moved)
-    by_handles = turn_by_handles(skeleton.binding, handles, skeleton.first.details)
+    by_handles = turn_by_handles(binding, handles, skeleton.first.details)
     ways = {
         "frames": by_frames,
         "handle": by_handles,
-        "blended": blend_details(skeleton.binding, by_frames, by_handles),
+        "blended": blend_details(binding, by_frames, by_handles),
     }
     found = moved + ways[details]
-    if skeleton.fine is rig.mesh.vertices:
+    if skeleton.fine is not rig.mesh.vertices:
+        most = min(SECOND_PASS, rig.n_modes)
+        fitted = rig.eigenvectors[:, :most] @ project_on_modes(rig, found, most)
+        found = fitted + turn_by_frames(faces, skeleton.second, fitted)
+    if not binding.fixed.any():
         return found
-    most = min(SECOND_PASS, rig.n_modes)
-    fitted = rig.eigenvectors[:, :most] @ project_on_modes(rig, found, most)
-    return fitted + turn_by_frames(faces, skeleton.second, fitted)
+    # Modes know no fixed vertices. They are set back, and the free ones around them with them.
+    moved = np.where(binding.fixed[:, None], found - rig.mesh.vertices, 0)
+    return found - spread_harmonically(binding.part, moved)
