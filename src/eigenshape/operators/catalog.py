@@ -3,6 +3,7 @@
 import inspect
 import warnings
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -16,9 +17,9 @@ from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import ShapeLike, as_shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.operators.clouds.cloud_kernel import point_cloud_laplacian
+from eigenshape.operators.clouds.cloud_kernel import checked_laplacian, point_cloud_laplacian
 from eigenshape.operators.clouds.gaussian import mesh_laplacian
-from eigenshape.operators.clouds.kernel import UnevenSpacingError
+from eigenshape.operators.clouds.kernel import KernelOptions, UnevenSpacingError
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.fem import fem_laplacian
 from eigenshape.operators.graph import graph_laplacian
@@ -167,19 +168,24 @@ def build_laplacian(
     if operator is not None or options or not isinstance(shape, PointCloud):
         return entry.build(shape, **options)
     # The kernel operator, or the robust one if points are too uneven for one width.
+    found: Laplacian | UnevenSpacingError
     try:
-        return point_cloud_laplacian(shape)
+        found, fault = checked_laplacian(shape, KernelOptions(correct="log", form="random-walk"))
+        if not fault:
+            return found
     except UnevenSpacingError as error:
-        # A width that reaches the farthest point would blur all others: no width is right.
-        if shape.dim != 2 or shape.points.shape[1] != 3:
-            raise
-        try:
+        found, fault = error, ""
+    # A width that reaches the farthest point would blur all others: no width is right.
+    if shape.dim == 2 and shape.points.shape[1] == 3:
+        with suppress(InvalidShapeError):
             robust = robust_laplacian(shape)
-        except InvalidShapeError:
-            raise error from None
-    warnings.warn(
-        "The points are too uneven for a kernel of one width, so robust_laplacian joins each point "
-        "with its nearest ones. Pass a heat time t to use the kernel.",
-        stacklevel=2,
-    )
-    return robust
+            warnings.warn(
+                "The points are too uneven for a kernel of one width, so robust_laplacian joins "
+                "each point with its nearest ones. Pass a heat time t to use the kernel.",
+                stacklevel=2,
+            )
+            return robust
+    if isinstance(found, UnevenSpacingError):
+        raise found
+    warnings.warn(fault, stacklevel=2)
+    return found

@@ -6,6 +6,7 @@ from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.samples.quadrature import shape_quadrature
 from eigenshape.geometry.samples.spacing import neighbor_distance
+from eigenshape.operators.catalog import build_laplacian
 from eigenshape.operators.clouds import cloud_kernel
 from eigenshape.operators.clouds.cloud_kernel import cloud_width, point_cloud_laplacian
 from eigenshape.operators.clouds.gaussian import gaussian_laplacian
@@ -101,8 +102,43 @@ def test_random_points_of_a_circle_have_its_eigenvalues():
     found = solve_spectrum(point_cloud_laplacian(circle), 7).eigenvalues[1:]
     np.testing.assert_allclose(found, exact, rtol=0.02)
     # With h = 2e the gaps between the points nearly separate the circle into pieces.
-    narrow = solve_spectrum(point_cloud_laplacian(circle, edge_factor=2), 7).eigenvalues[1:]
+    with pytest.warns(UserWarning, match="over half of the heat stays"):
+        torn = point_cloud_laplacian(circle, edge_factor=2)
+    narrow = solve_spectrum(torn, 7).eigenvalues[1:]
     assert (narrow < 0.2 * exact).all()
+
+
+def half_thinned(ratio, seed=0):
+    """Return random points of a sphere, of whose lower half one in `ratio` is left."""
+    random = np.random.default_rng(seed)
+    points = random.standard_normal((4000, 3))
+    points /= np.linalg.norm(points, axis=1)[:, None]
+    kept = (points[:, 2] > 0) | (random.random(4000) < 1 / ratio)
+    return PointCloud(points[kept], 2)
+
+
+@pytest.mark.parametrize("ratio", [1, 2, 3, 5])
+def test_a_density_that_varies_a_little_is_no_fault(ratio):
+    laplacian = build_laplacian(half_thinned(ratio))  # warnings are errors
+    assert laplacian.kernel is not None
+    assert solve_spectrum(laplacian, 2).eigenvalues[1] == pytest.approx(2, rel=0.1)
+
+
+@pytest.mark.parametrize(("ratio", "wrong"), [(10, 0.8), (20, 0.3), (100, 0.01)])
+def test_points_beyond_the_reach_of_the_kernel_are_named_and_get_the_robust_operator(ratio, wrong):
+    cloud = half_thinned(ratio)
+    with pytest.warns(UserWarning, match=r"over half of the heat stays at \d+ points.*robust_lapl"):
+        kernel = point_cloud_laplacian(cloud)
+    found = solve_spectrum(kernel, 2).eigenvalues[1]
+    assert found < 2 * wrong
+    with pytest.warns(UserWarning, match="too uneven for a kernel of one width"):
+        robust = build_laplacian(cloud)
+    assert 1.2 < solve_spectrum(robust, 2).eigenvalues[1] < 2
+    # There is no robust operator in R^4.
+    flat = PointCloud(np.column_stack([cloud.points, np.zeros(cloud.n_points)]), 2)
+    with pytest.warns(UserWarning, match="over half of the heat stays"):
+        same = build_laplacian(flat)
+    assert solve_spectrum(same, 2).eigenvalues[1] == pytest.approx(found, rel=1e-6, abs=1e-9)
 
 
 @pytest.mark.long

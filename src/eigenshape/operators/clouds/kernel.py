@@ -203,17 +203,17 @@ def require_whole(laplacian: Laplacian, labels: np.ndarray, kernel: GaussianKern
         )
 
 
-def warn_of_narrow(kernel: GaussianKernel) -> None:
+def warn_of_narrow(kernel: GaussianKernel, stacklevel: int = 3) -> None:
     """Warn if the kernel hardly reaches the neighbors."""
     if kernel.edge_factor < NARROW:
         warnings.warn(
             f"A kernel of width h = {kernel.edge_factor:.3g} e suits regular points only; on irregular points "
             "eigenvalues are 5 to 20 % too low. The default is h = 2e.",
-            stacklevel=3,
+            stacklevel=stacklevel,
         )
 
 
-def warn_of_few(measure: Quadrature, kernel: GaussianKernel) -> None:
+def warn_of_few(measure: Quadrature, kernel: GaussianKernel, stacklevel: int = 3) -> None:
     """Warn if fewer than ten eigenvalues can be distinguished at this t, by Weyl's law."""
     ball = pi ** (measure.dim / 2) / gamma(measure.dim / 2 + 1)
     length = (measure.weights / kernel.t ** (measure.dim / 2)).sum()
@@ -223,5 +223,5 @@ def warn_of_few(measure: Quadrature, kernel: GaussianKernel) -> None:
             f"With the heat time t = {kernel.t:.4g} about {n_pairs} eigenvalues can be distinguished "
             f"(t λ < {LAST}); k eigenvalues of a surface need n > 5 k t/e² points, and 21 k t/e² without "
             f"correction. Choose a smaller t.",
-            stacklevel=3,
+            stacklevel=stacklevel,
         )
