@@ -17,6 +17,7 @@ pytestmark = [
     pytest.mark.filterwarnings(
         "ignore:With the heat time",
         "ignore:A kernel of width",
+        "ignore:A kernel must reach",
         "ignore:.* were split into .* tetrahedra",
     ),
 ]
