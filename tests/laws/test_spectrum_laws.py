@@ -98,6 +98,7 @@ def test_rigid_motion_changes_nothing(seed, mass):
     )
 
 
+@pytest.mark.filterwarnings("ignore:All .* eigenvalues are 0")
 @few
 @given(seeds, masses, st.integers(1, 25))
 def test_a_disjoint_union_merges_spectra(seed, mass, k):

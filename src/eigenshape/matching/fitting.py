@@ -81,7 +81,7 @@ class FitPlan:
         guess: Int[np.ndarray, " k"] | None = None,
     ) -> tuple[Float[np.ndarray, " k"], Int[np.ndarray, " k"]]:
         """Return how far the nearest vertex of the whole that faces the same way is, and which."""
-        return self.whole.tree.nearest(np.hstack([points, NORMAL_LENGTH * normals]), guess)
+        return self.whole.tree().nearest(np.hstack([points, NORMAL_LENGTH * normals]), guess)
 
 
 @record
@@ -191,7 +191,7 @@ def bend_part(
         (plan.samples, plan.pull, plan.arms),
         plan.edges,
         (whole.mesh.vertices, whole.normals, plan.inner),
-        whole.tree,
+        whole.tree(),
         NORMAL_LENGTH,
         np.array(stiffnesses),
         along,

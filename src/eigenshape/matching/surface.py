@@ -71,9 +71,12 @@ class Surface(ReadOnly):
         """Area in square units."""
         return float(self.areas.sum())
 
-    @cached_property
     def tree(self) -> RowTree:
-        """Vertices with their normals, in which all fits to a whole look for the nearest ones."""
+        """Return vertices with their normals, in which all fits to a whole look for the nearest ones."""
+        return self._tree
+
+    @cached_property
+    def _tree(self) -> RowTree:
         return RowTree(np.hstack([self.mesh.vertices, NORMAL_LENGTH * self.normals]))
 
 
