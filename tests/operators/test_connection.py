@@ -269,7 +269,8 @@ def test_an_edge_with_three_faces_is_refused():
     mesh = TriangleMesh(points, [[0, 1, 2], [1, 0, 3], [0, 1, 4]])
     for build in (connection_laplacian, tangent_frames):
         with pytest.raises(
-            InvalidShapeError, match=r"manifold; more than two faces share edge \(0, 1\) \(1 such\)"
+            InvalidShapeError,
+            match=r"At most two faces may share an edge; more share edge \(0, 1\) \(1 such\)",
         ):
             build(mesh)
 

@@ -14,6 +14,8 @@ from eigenshape.operators.clouds.cloud_triangles import local_triangles
 from eigenshape.operators.robust import robust_laplacian
 from eigenshape.shapes.surfaces import grid, icosphere, torus
 
+pytestmark = pytest.mark.filterwarnings("ignore:Both sides of a seam")
+
 FLIPPED_FROM = 1e-6  # theirs leaves weights down to minus this; ours down to 0
 
 # Files with four corners or more on a circle, to the digits that are written: either diagonal is

@@ -18,7 +18,7 @@ from eigenshape.calculus.vector_heat import as_rows
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.requirements import require_oriented_manifold, require_sound
+from eigenshape.geometry.requirements import require_oriented, require_sound, require_two_faces
 from eigenshape.geometry.topology import (
     boundary_edges,
     euler_characteristic,
@@ -75,7 +75,7 @@ def flatten_conformally(mesh: MeshLike) -> Float[np.ndarray, "n 2"]:
     ------
     InvalidShapeError
         If the mesh is not connected, has no boundary, has faces without area or repeated, or
-        neighboring faces have opposite orientations, or it is no manifold.
+        neighboring faces have opposite orientations, or more than two share an edge.
     ConvergenceError
         If the iteration does not settle, or faces are too thin for its equations to be solved.
 
@@ -98,7 +98,8 @@ def flatten_conformally(mesh: MeshLike) -> Float[np.ndarray, "n 2"]:
     """
     mesh = as_mesh(mesh)
     require_sound(mesh)
-    require_oriented_manifold(mesh)
+    require_two_faces(mesh)
+    require_oriented(mesh)
     rim = boundary_edges(mesh)
     n_components, _ = vertex_components(mesh)
     if not len(rim) or n_components > 1:
@@ -182,7 +183,7 @@ def map_to_sphere(
     ------
     InvalidShapeError
         If the mesh is not closed, connected and of genus 0, faces have no area or are repeated, or
-        neighboring faces have opposite orientations, or it is no manifold.
+        neighboring faces have opposite orientations, or more than two share an edge.
     ConvergenceError
         If the surface does not become round, triangles are turned over on the sphere or collapse
         there, or faces are too thin for the equations of the flow to be solved.
@@ -205,7 +206,8 @@ def map_to_sphere(
     mesh = as_mesh(mesh)
     most = step_number(n_steps)
     require_sound(mesh)
-    require_oriented_manifold(mesh)
+    require_two_faces(mesh)
+    require_oriented(mesh)
     euler, (n_components, _) = euler_characteristic(mesh), vertex_components(mesh)
     if not is_closed(mesh) or n_components > 1 or euler != 2:
         raise InvalidShapeError(

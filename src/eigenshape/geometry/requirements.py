@@ -139,18 +139,24 @@ def require_oriented(mesh: TriangleMesh) -> None:
     )
 
 
+def require_two_faces(mesh: TriangleMesh) -> None:
+    """Raise an error if more than two faces share an edge."""
+    edges = non_manifold_edges(mesh)
+    if len(edges):
+        raise InvalidShapeError(
+            "At most two faces may share an edge; more share edge "
+            f"({edges[0, 0]}, {edges[0, 1]}) ({len(edges)} such)."
+        )
+
+
 def require_oriented_manifold(mesh: TriangleMesh) -> None:
     """Raise an error if vertices have no tangent planes with a side to look at them from.
 
     An edge has at most two faces, a vertex one fan of faces, and neighboring faces are turned
     alike.
     """
-    edges, vertices = non_manifold_edges(mesh), non_manifold_vertices(mesh)
-    if len(edges):
-        raise InvalidShapeError(
-            "Tangent planes need a manifold; more than two faces share edge "
-            f"({edges[0, 0]}, {edges[0, 1]}) ({len(edges)} such)."
-        )
+    require_two_faces(mesh)
+    vertices = non_manifold_vertices(mesh)
     if vertices.size:
         raise InvalidShapeError(
             f"Tangent planes need a manifold; the faces at vertex {vertices[0]} at "

@@ -179,6 +179,7 @@ def test_a_part_of_a_spectrum_has_no_heat_signature():
 
 
 @pytest.mark.long
+@pytest.mark.filterwarnings("ignore:Both sides of a seam")
 def test_where_counts_and_finds_never_agree_nothing_is_returned(monkeypatch):
     small = irregular_grid(6, 6, rng=np.random.default_rng(0))
     faces = [small.faces + copy * small.n_vertices for copy in range(20)]
