@@ -241,7 +241,7 @@ LIBRARIES = {
         _lapy_solve,
         _lapy_matrices,
         "mesh",
-        "lapy[chol]",
+        "cholespy",
         "Solver(TriaMesh(v, f), use_cholmod=True).eigs(k)",
     ),
     "robust_laplacian": Library(
