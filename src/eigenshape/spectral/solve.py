@@ -212,8 +212,8 @@ def solve_spectrum(  # noqa: PLR0913 - one keyword for each choice: which pairs,
     if wanted > 1 and not spectrum.eigenvalues.any():
         warnings.warn(
             f"All {wanted} eigenvalues are 0: the shape is in {wanted} pieces or more, each of which "
-            f"has one. Ask for more, or try {LARGEST}: it joins pieces that lie edge on edge, and "
-            "drops others.",
+            f"has one. Ask for more of them. Try {LARGEST}: it joins pieces that lie edge on edge, "
+            "and drops others.",
             stacklevel=2,
         )
     if cache is not None:
